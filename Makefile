@@ -1,0 +1,73 @@
+# Commands for people; the build itself is CMake (CMakePresets.json). Missing Debian packages are installed on the way.
+.PHONY: help run test asan slow bench format format-check tidy install-deps build-release build-asan
+.DEFAULT_GOAL := help
+
+JOBS ?= $(shell nproc)
+
+packages := g++ cmake ninja-build \
+  libeigen3-dev libsuitesparse-dev libopenblas-dev libarpack2-dev libspectra-dev libsundials-dev \
+  libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libfmt-dev libgtest-dev libbenchmark-dev \
+  python3 python3-numpy python3-scipy python3-meshio python3-vtk9 python3-h5py
+format tidy: packages += clang-format clang-tidy
+
+sources = $(wildcard $(foreach folder,fem reduction dynamics apps tests tests/* tests/install/*,$(folder)/*.hpp $(folder)/*.cpp))
+
+help:
+	@echo "make run           build, fly the scene sport, write results/sport and its report"
+	@echo "make test          build and run the tests; asan: the same with sanitizers; slow: the long ones"
+	@echo "make bench         speed, measured"
+	@echo "make format, tidy  clang-format and clang-tidy over all sources"
+	@echo "make install-deps  install the Debian packages all of these need (done by each of them, too)"
+
+run: install-deps
+	cmake --preset release
+	cmake --build --preset release -j $(JOBS) --target flexboom
+	build/release/apps/flexboom run sport --out results/sport --report
+	@echo "report: file://$(CURDIR)/results/sport/report.html"
+
+test: build-release
+	ctest --preset release -j $(JOBS)
+
+asan: build-asan
+	ctest --preset asan -j $(JOBS)
+
+slow: build-release
+	ctest --preset slow -j $(JOBS)
+
+bench: build-release
+	@for program in build/release/tests/bench_*; do [ -x "$$program" ] && [ -f "$$program" ] || continue; \
+	  echo "== $${program##*/}"; "$$program" || exit 1; done
+
+build-release build-asan: build-%: install-deps
+	cmake --preset $*
+	cmake --build --preset $* -j $(JOBS)
+
+format: install-deps
+	clang-format -i $(sources)
+
+format-check:
+	clang-format --dry-run --Werror $(sources)
+
+tidy: build-release
+	printf '%s\n' $(filter %.cpp,$(sources)) | grep -v '^tests/' \
+	  | xargs -n 1 -P $(JOBS) clang-tidy --quiet --warnings-as-errors='*' -p build/release
+
+install-deps:
+	@if ! command -v apt-get >/dev/null; then \
+	  echo "No apt-get here, so nothing is installed. These Debian packages, or the same under other names, are needed:"; \
+	  echo "  $(packages)"; \
+	  exit 0; \
+	fi; \
+	missing=""; \
+	for package in $(packages); do \
+	  dpkg-query -W -f='$${db:Status-Status}' $$package 2>/dev/null | grep -qx installed || missing="$$missing $$package"; \
+	done; \
+	[ -n "$$missing" ] || exit 0; \
+	echo "installing:$$missing"; \
+	sudo=""; \
+	if [ "$$(id -u)" != 0 ]; then \
+	  command -v sudo >/dev/null || { echo "Not root and no sudo; as root: apt-get install$$missing" >&2; exit 1; }; \
+	  sudo=sudo; \
+	fi; \
+	$$sudo apt-get update && \
+	$$sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $$missing
