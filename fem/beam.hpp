@@ -1,0 +1,22 @@
+#pragma once
+
+#include "fem/element.hpp"
+
+/// Straight beam with two nodes and order p = 1..12, Euler-Bernoulli or Timoshenko as its BeamProperty says (README).
+/// Freedoms: (u, theta) of both nodes in mesh axes, then internal amplitudes [m; torsion rad] in element axes:
+/// axial (p), torsion (p), deflection along y, deflection along z (p - 1 each, Timoshenko p + 2 more).
+namespace flexboom::beam {
+
+int internal_freedoms(const Mesh&, const Element&);
+
+/// Consistent strain points: rows of B are the axial strain, (Timoshenko: shear strains y, z,) twist [1/m], curvatures
+/// about y, z [1/m].
+void strain_points(const Mesh&, const Element&, const StrainPointVisitor&);
+
+/// Four points in every section that carry its A, Iy, Iz exactly, or one on the axis without rotary inertia.
+void mass_points(const Mesh&, const Element&, int extra, const MassPointVisitor&);
+
+/// Displacement [m] and rotation [rad] rows in mesh axes.
+Eigen::Matrix<double, 6, Eigen::Dynamic> interpolation(const Mesh&, const Element&, double s);
+
+}  // namespace flexboom::beam

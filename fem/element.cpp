@@ -1,0 +1,111 @@
+#include "fem/element.hpp"
+
+#include "fem/beam.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <mutex>
+#include <numbers>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+
+constexpr int max_gauss_points = 64;
+
+// K = sum w B^T D B over the strain points of any element.
+template <void (*strain_points)(const Mesh&, const Element&, const StrainPointVisitor&)>
+MatrixXd stiffness(const Mesh& mesh, const Element& element) {
+  MatrixXd K;
+  strain_points(mesh, element, [&K](double weight, const MatrixXd& B, const MatrixXd& D) {
+    if (K.size() == 0) K.setZero(B.cols(), B.cols());
+    const MatrixXd DB = weight * D * B;
+    K.triangularView<Eigen::Lower>() += B.transpose() * DB;
+  });
+  K.triangularView<Eigen::StrictlyUpper>() = K.transpose();
+  return K;
+}
+
+// The table: one row per element. The theory of a beam is in its property; Mesh::validate checks that row and property
+// agree.
+constexpr std::array<ElementType, 2> table{{
+    {"beam-euler-bernoulli", 2, beam::internal_freedoms, stiffness<beam::strain_points>, beam::mass_points,
+     beam::strain_points, beam::interpolation},
+    {"beam-timoshenko", 2, beam::internal_freedoms, stiffness<beam::strain_points>, beam::mass_points,
+     beam::strain_points, beam::interpolation},
+}};
+
+// Root i of P_n by Newton from the asymptotic estimate, in long double so that the rounded values are correct doubles.
+GaussRule make_gauss_rule(int n) {
+  GaussRule rule{Eigen::VectorXd(n), Eigen::VectorXd(n)};
+  for (int i = 0; i < n; ++i) {
+    long double x = -std::cos(std::numbers::pi_v<long double> * (i + 0.75L) / (n + 0.5L));
+    long double slope = 1;
+    for (int iteration = 0; iteration < 12; ++iteration) {
+      long double p = x, previous = 1;
+      for (int k = 1; k < n; ++k) {
+        const long double next = ((2 * k + 1) * x * p - k * previous) / (k + 1);
+        previous = p;
+        p = next;
+      }
+      slope = n * (x * p - previous) / (x * x - 1);
+      x -= p / slope;
+    }
+    if (2 * i + 1 == n) x = 0;
+    rule.points(i) = static_cast<double>(x);
+    rule.weights(i) = static_cast<double>(2 / ((1 - x * x) * slope * slope));
+  }
+  return rule;
+}
+
+}  // namespace
+
+std::span<const ElementType> element_types() { return table; }
+
+int element_type(std::string_view name) {
+  std::string known;
+  for (size_t i = 0; i < table.size(); ++i) {
+    if (table[i].name == name) return static_cast<int>(i);
+    known += fmt::format("{}\"{}\"", i ? ", " : "", table[i].name);
+  }
+  throw InputError(fmt::format("element type \"{}\" is not known; there are {}", name, known));
+}
+
+const GaussRule& gauss_rule(int n) {
+  static std::array<GaussRule, max_gauss_points + 1> rules;
+  static std::array<std::once_flag, max_gauss_points + 1> made;
+  require(n >= 1 && n <= max_gauss_points,
+          fmt::format("Gauss rule of {} points; there are 1 to {}", n, max_gauss_points));
+  const auto i = static_cast<size_t>(n);
+  std::call_once(made[i], [n, i] { rules[i] = make_gauss_rule(n); });
+  return rules[i];
+}
+
+void nodal_body_mass_points(const Mesh& mesh, const NodalBody& body, const MassPointVisitor& visit) {
+  if (body.mass == 0) return;
+  const Vector3d node = mesh.nodes.col(body.node);
+  // Second moments integral(r r^T) = tr(J)/2 - J. A pair of points m/6 at +-a along each principal axis has 2 m/6 a^2
+  // there.
+  const Matrix3d moments = body.inertia.trace() / 2 * Matrix3d::Identity() - body.inertia;
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(moments);
+  Eigen::Matrix3Xd N = Eigen::Matrix3Xd::Zero(3, 6);
+  N.leftCols<3>().setIdentity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double a = std::sqrt(3 * std::max(principal.eigenvalues()(axis), 0.0) / body.mass);
+    for (const double sign : {1.0, -1.0}) {
+      const Vector3d r = body.offset + sign * a * principal.eigenvectors().col(axis);
+      for (int k = 0; k < 3; ++k) N.col(3 + k) = Vector3d::Unit(k).cross(r);  // u = u_node + theta x r
+      visit(body.mass / 6, node + r, N);
+    }
+  }
+}
+
+}  // namespace flexboom

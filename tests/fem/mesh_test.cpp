@@ -1,0 +1,165 @@
+#include "fem_testing.hpp"
+
+namespace flexboom::testing {
+namespace {
+
+BeamGeometry two_segments() {
+  BeamGeometry boom = uniform_boom(RoundBar{0.01}, 0.1, BeamTheory::timoshenko, 0, 4);
+  boom.segments.push_back({RoundBar{0.01}, RoundBar{0.005}, 0.3, aluminium, 0});
+  return boom;
+}
+
+RigidAttachment sensor(double position) {
+  return {"sensor", position, 0.1, Eigen::Vector3d(1e-5, 2e-5, 2e-5).asDiagonal(), {0, 0.01, 0}};
+}
+
+TEST(MakeMesh, PutsNodesAtSegmentEndsAndAttachments) {
+  BeamGeometry boom = two_segments();
+  boom.attachments = {sensor(0.25)};
+  const Mesh mesh = make_mesh(boom);
+  mesh.validate();
+  const Eigen::VectorXd x = mesh.nodes.row(0);
+  EXPECT_EQ(x(0), 0);
+  EXPECT_EQ(x(x.size() - 1), boom.length());
+  EXPECT_EQ((x.array() - 0.1).abs().minCoeff(), 0);
+  EXPECT_EQ(x(mesh.bodies[0].node), 0.25);
+  EXPECT_EQ(node_set(mesh, "sensor"), std::vector<int>{mesh.bodies[0].node});
+  EXPECT_EQ(node_set(mesh, "tip"), std::vector<int>{static_cast<int>(x.size()) - 1});
+  EXPECT_TRUE((x.tail(x.size() - 1) - x.head(x.size() - 1)).minCoeff() > 0);
+}
+
+TEST(MakeMesh, ChoosesAboutEightElements) {
+  EXPECT_EQ(make_mesh(two_segments()).elements.size(), 8U);
+  BeamGeometry many = two_segments();
+  for (int i = 0; i < 20; ++i) many.segments.push_back(many.segments[0]);
+  EXPECT_EQ(make_mesh(many).elements.size(), 21U + 1U);  // 0.3 m of 2.3 m is one element, like every other segment
+  many = two_segments();
+  many.segments[0].elements = 5;
+  many.segments[1].elements = 2;
+  EXPECT_EQ(make_mesh(many).elements.size(), 7U);
+}
+
+TEST(MakeMesh, TaperContinuesAcrossElements) {
+  BeamGeometry boom = uniform_boom(RoundBar{0.01}, 0.4, BeamTheory::timoshenko, 4, 2);
+  boom.segments[0].end = RoundBar{0.006};
+  const Mesh mesh = make_mesh(boom);
+  for (size_t e = 0; e < 4; ++e) {
+    const auto& property = mesh.beam_properties[static_cast<size_t>(mesh.elements[e].property)];
+    EXPECT_NEAR(std::get<RoundBar>(property.start).diameter, 0.01 - 0.001 * static_cast<double>(e), 1e-17);
+    EXPECT_NEAR(std::get<RoundBar>(property.end).diameter, 0.009 - 0.001 * static_cast<double>(e), 1e-17);
+  }
+}
+
+TEST(MakeMesh, AttachmentAtSegmentEndNeedsNoNewNode) {
+  BeamGeometry boom = two_segments();
+  const size_t plain = make_mesh(boom).elements.size();
+  boom.attachments = {sensor(0.1 + 1e-17), sensor(0.4), sensor(0)};
+  boom.attachments[1].name = boom.attachments[2].name = "";
+  EXPECT_EQ(make_mesh(boom).elements.size(), plain);
+}
+
+std::string fault(const std::function<void(BeamGeometry&)>& spoil) {
+  BeamGeometry boom = two_segments();
+  boom.attachments = {sensor(0.2)};
+  spoil(boom);
+  return input_error([&] { boom.validate(); });
+}
+
+TEST(BeamGeometry, BadSegmentSaysWhatIsWrong) {
+  using B = BeamGeometry;
+  EXPECT_EQ(fault([](B& b) { b.segments.clear(); }), "segments: a boom needs at least one");
+  EXPECT_EQ(fault([](B& b) { b.order = 13; }), "order is 13; it must be 1 to 12");
+  EXPECT_EQ(fault([](B& b) { b.segments[1].length = -0.1; }), "segments[1]: length is -0.1 m; it must be positive");
+  EXPECT_EQ(fault([](B& b) { b.segments[1].length = INFINITY; }), "segments[1]: length is inf m; it must be positive");
+  EXPECT_EQ(fault([](B& b) { b.segments[0].elements = -1; }),
+            "segments[0]: elements is -1; it must be 1 to 100000, or 0 to let the program choose");
+  EXPECT_EQ(fault([](B& b) { b.segments[0].material.nu = 0.6; }),
+            "segments[0]: material: nu is 0.6; it must lie between -1 and 0.5");
+  EXPECT_EQ(fault([](B& b) { b.segments[0].end = RoundBar{0}; }),
+            "segments[0]: end: round bar: diameter [m]: is 0; it must be positive");
+  EXPECT_EQ(fault([](B& b) {
+              b.segments[0].end = Tube{0.01, 0.001};
+            }),
+            "segments[0]: taper: the start and the end must be sections of one kind");
+  EXPECT_EQ(fault([](B& b) {
+              for (BeamSegment& s : b.segments) s.material.rho = 0;
+              b.attachments.clear();
+            }),
+            "the boom has no mass: rho is zero in every segment and nothing with mass is attached");
+}
+
+TEST(BeamGeometry, BadAttachmentSaysWhatIsWrong) {
+  using B = BeamGeometry;
+  EXPECT_EQ(fault([](B& b) { b.attachments[0].position = 0.5; }),
+            "attachments[0]: position is 0.5 m; the boom reaches from 0 to 0.4 m");
+  EXPECT_EQ(fault([](B& b) { b.attachments[0].mass = -1; }),
+            "attachments[0]: mass is -1 kg; it must be zero or positive");
+  EXPECT_EQ(fault([](B& b) { b.attachments[0].mass = 0; }),
+            "attachments[0]: inertia without mass; give the mass that carries it");
+  EXPECT_EQ(fault([](B& b) { b.attachments[0].offset(1) = NAN; }),
+            "attachments[0]: offset has a component that is not finite");
+  EXPECT_EQ(fault([](B& b) { b.attachments[0].inertia(0, 1) = 1e-6; }), "attachments[0]: inertia must be symmetric");
+  EXPECT_EQ(fault([](B& b) { b.attachments[0].inertia = Eigen::Vector3d(1, 1, 3).asDiagonal(); }),
+            "attachments[0]: inertia breaks the triangle inequality: principal values 1, 1, 3 kg m^2; none can exceed "
+            "the sum "
+            "of the others");
+  EXPECT_EQ(fault([](B& b) { b.attachments[0].inertia = Eigen::Vector3d(-1, 1, 1).asDiagonal(); }),
+            "attachments[0]: inertia has the negative principal value -1 kg m^2");
+  EXPECT_EQ(fault([](B& b) { b.attachments[0].name = "tip"; }),
+            "attachments[0]: name \"tip\" is taken; choose another");
+  EXPECT_EQ(fault([](B& b) { b.attachments.push_back(b.attachments[0]); }),
+            "attachments[1]: name \"sensor\" is taken; choose another");
+}
+
+std::string mesh_fault(const std::function<void(Mesh&)>& spoil) {
+  BeamGeometry boom = two_segments();
+  boom.attachments = {sensor(0.2)};
+  Mesh mesh = make_mesh(boom);
+  spoil(mesh);
+  return input_error([&] { assemble(mesh); });
+}
+
+TEST(Mesh, BadInputSaysWhatIsWrong) {
+  EXPECT_EQ(input_error([] { Mesh{}.validate(); }), "mesh: has no elements");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.nodes(2, 3) = NAN; }), "mesh: nodes[3] has a coordinate that is not finite");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].nodes[1] = 99; }),
+            "mesh: elements[2]: node 99 is missing; the mesh has nodes 0 to 8");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].nodes.push_back(0); }),
+            "mesh: elements[2]: has 3 nodes; \"beam-timoshenko\" has 2");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].type = 7; }),
+            "mesh: elements[2]: type 7 is not a row of the table of 2 elements");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].type = element_type("beam-euler-bernoulli"); }),
+            "mesh: elements[2]: type \"beam-euler-bernoulli\" does not agree with the theory of its property");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].property = -1; }),
+            "mesh: elements[2]: beam property -1 is missing; the mesh has 8");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].order = 0; }), "mesh: elements[2]: order is 0; it must be 1 to 12");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.nodes.col(1) = m.nodes.col(0); }), "mesh: elements[0]: beam of zero length");
+  EXPECT_EQ(mesh_fault([](Mesh& m) {
+              m.beam_properties[0].y_axis = {2, 0, 0};
+            }),
+            "mesh: elements[0]: the y axis of the section is parallel to the beam");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.beam_properties[1].start = RoundBar{-1}; }),
+            "mesh: beam_properties[1]: start: round bar: diameter [m]: is -1; it must be positive");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements.pop_back(); }), "mesh: node 8 belongs to no element");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements.erase(m.elements.begin() + 3); }),
+            "mesh: node 4 is not connected with node 0: the mesh has several parts");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.bodies[0].node = 42; }), "mesh: bodies[0]: node 42 is missing");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.bodies[0].mass = -1; }),
+            "mesh: bodies[0]: mass is -1 kg; it must be zero or positive");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.node_sets["clamp"] = {}; }), "mesh: node set \"clamp\": has no node");
+  EXPECT_EQ(
+      mesh_fault([](Mesh& m) {
+        for (BeamProperty& p : m.beam_properties) p.rotary_inertia = false;
+        m.nodes(1, 8) = 0.01;
+      }),
+      "mesh: elements[7]: a beam without rotary inertia must run along an axis of the mesh (its torsion has no mass)");
+}
+
+TEST(Mesh, UnknownNodeSetListsThoseThatExist) {
+  const Mesh mesh = make_mesh(two_segments());
+  EXPECT_EQ(input_error([&] { node_set(mesh, "rooot"); }),
+            "node set \"rooot\" not found; the mesh has \"root\", \"tip\"");
+}
+
+}  // namespace
+}  // namespace flexboom::testing
