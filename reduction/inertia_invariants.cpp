@@ -1,0 +1,308 @@
+#include "reduction/inertia_invariants.hpp"
+
+#include "fem/check.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <span>
+#include <utility>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::Matrix3Xd;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+/// Sum of dm z z^T over the mass points, with z = (1, u0, S_1, ..., S_n): every invariant is a linear function of this
+/// matrix.
+MatrixXd gram_matrix(const Mesh& mesh, const DofMap& dofs, const MatrixXd& Phi) {
+  const Index size = 4 + 3 * Phi.cols();
+  MatrixXd gram = MatrixXd::Zero(size, size);
+  VectorXd z(size);
+  z(0) = 1;
+  for_each_mass_point(mesh, dofs, [&](double dm, const Vector3d& u0, const auto& N, std::span<const int> point_dofs) {
+    z.segment<3>(1) = u0;
+    z.tail(size - 4).reshaped(3, Phi.cols()).noalias() = N * Phi(point_dofs, Eigen::all);
+    gram.selfadjointView<Eigen::Lower>().rankUpdate(z, dm);
+  });
+  return gram.selfadjointView<Eigen::Lower>();
+}
+
+// For W = sum dm a b^T:  sum dm a x b  is its axial vector, and  -sum dm (tilde(a) tilde(b) + tilde(b) tilde(a)) / 2 =
+// tr W I - sym W.
+Vector3d axial(const Matrix3d& W) { return {W(1, 2) - W(2, 1), W(2, 0) - W(0, 2), W(0, 1) - W(1, 0)}; }
+Matrix3d inertia_of(const Matrix3d& W) { return W.trace() * Matrix3d::Identity() - (W + W.transpose()) / 2; }
+
+void set_inertia(ReducedBody& body, const MatrixXd& gram) {
+  const auto block = [&gram](Index k) { return 4 + 3 * k; };
+  body.m = gram(0, 0);
+  body.mc0 = gram.block<3, 1>(1, 0);
+  body.J0 = inertia_of(gram.block<3, 3>(1, 1));
+  for (Index k = 0; k < body.n(); ++k) {
+    const auto kk = static_cast<size_t>(k);
+    const Matrix3d u0_S = gram.block<3, 3>(1, block(k));
+    body.Ct.col(k) = gram.block<3, 1>(block(k), 0);
+    body.Cr0.col(k) = axial(u0_S);
+    body.J1[kk] = 2 * inertia_of(u0_S);
+    for (Index l = 0; l < body.n(); ++l) {
+      const Matrix3d S_S = gram.block<3, 3>(block(k), block(l));
+      body.Me(k, l) = S_S.trace();
+      body.Cr1[kk].col(l) = axial(S_S);
+      body.J2[kk][static_cast<size_t>(l)] = inertia_of(S_S);
+    }
+  }
+}
+
+/// Ke = sum w (B Phi)^T D (B Phi) over the strain points: Phi^T K Phi, but without the cancellation in K Phi.
+MatrixXd reduced_stiffness(const Mesh& mesh, const DofMap& dofs, const MatrixXd& Phi) {
+  MatrixXd Ke = MatrixXd::Zero(Phi.cols(), Phi.cols());
+  for (size_t e = 0; e < mesh.elements.size(); ++e) {
+    const Element& element = mesh.elements[e];
+    const MatrixXd shapes = Phi(dofs.of_element(mesh, static_cast<int>(e)), Eigen::all);
+    element_types()[static_cast<size_t>(element.type)].strain_points(
+        mesh, element, [&](double weight, const MatrixXd& B, const MatrixXd& D) {
+          const MatrixXd strain = B * shapes;
+          Ke.noalias() += weight * strain.transpose() * D * strain;
+        });
+  }
+  return (Ke + Ke.transpose()) / 2;
+}
+
+/// A marker at the node of every node set that has one node.
+std::vector<Marker> node_markers(const Mesh& mesh, const MatrixXd& Phi) {
+  std::vector<Marker> markers;
+  for (const auto& [name, nodes] : mesh.node_sets) {
+    if (nodes.size() != 1) continue;
+    const int first = DofMap::of_node(nodes.front(), 0);
+    markers.push_back({name, mesh.nodes.col(nodes.front()), Phi.middleRows<3>(first), Phi.middleRows<3>(first + 3)});
+  }
+  return markers;
+}
+
+DisplayShape display_shape(const Mesh& mesh, const DofMap& dofs, const MatrixXd& Phi) {
+  const auto elements = static_cast<int>(mesh.elements.size());
+  DisplayLines lines = display_lines(mesh, std::max(3, 1 + 20 / std::max(elements, 1)));
+  DisplayShape display;
+  for (size_t i = 0; i < lines.element.size(); ++i) {
+    const Element& element = mesh.elements[static_cast<size_t>(lines.element[i])];
+    const auto N = element_types()[static_cast<size_t>(element.type)].interpolation(mesh, element, lines.parameter[i]);
+    display.S.emplace_back(N.topRows<3>() * Phi(dofs.of_element(mesh, lines.element[i]), Eigen::all));
+  }
+  display.points = std::move(lines.points);
+  display.lines = std::move(lines.lines);
+  return display;
+}
+
+// ---- checks by independent routes: the definitions with tilde matrices, a finer quadrature, rigid motions and M ----
+
+Matrix3d tilde(const Vector3d& a) {
+  Matrix3d A;
+  A << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
+  return A;
+}
+
+/// Adds one mass point to a body, each integral as FORMULATION 2 defines it.
+void add_by_definition(ReducedBody& sum, double dm, const Vector3d& u0, const Matrix3Xd& S) {
+  const Matrix3d U = tilde(u0);
+  sum.m += dm;
+  sum.mc0 += dm * u0;
+  sum.J0 -= dm * U * U;
+  sum.Ct += dm * S;
+  sum.Cr0 += dm * U * S;
+  sum.Me += dm * S.transpose() * S;
+  for (Index k = 0; k < S.cols(); ++k) {
+    const auto kk = static_cast<size_t>(k);
+    const Matrix3d S_k = tilde(S.col(k));
+    sum.Cr1[kk] += dm * S_k * S;
+    sum.J1[kk] -= dm * (U * S_k + S_k * U);
+    for (Index l = 0; l < S.cols(); ++l) {
+      const Matrix3d S_l = tilde(S.col(l));
+      sum.J2[kk][static_cast<size_t>(l)] -= dm / 2 * (S_k * S_l + S_l * S_k);
+    }
+  }
+}
+
+/// The invariants of the body frozen in the shape u0 + S q, by definition: its m, mc0, J0 and Cr0 are m, mc(q), J(q),
+/// Cr(q).
+ReducedBody integrate(const Mesh& mesh, const DofMap& dofs, const MatrixXd& Phi, const VectorXd& q) {
+  constexpr int finer = 3;  // quadrature points per direction above the rule that made the body
+  ReducedBody sum = blank_body("check", static_cast<int>(Phi.cols()));
+  for_each_mass_point(
+      mesh, dofs,
+      [&](double dm, const Vector3d& u0, const auto& N, std::span<const int> point_dofs) {
+        const Matrix3Xd S = N * Phi(point_dofs, Eigen::all);
+        add_by_definition(sum, dm, u0 + S * q, S);
+      },
+      finer);
+  return sum;
+}
+
+/// Largest deviation of A from B, relative to the largest entry of B, or to `bound` where B is zero by symmetry
+/// (bound: what Cauchy-Schwarz allows such an integral to be).
+class CheckList {
+ public:
+  explicit CheckList(double tolerance) : tolerance_(tolerance) {}
+
+  void compare(const std::string& name, const MatrixXd& A, const MatrixXd& B, double bound) {
+    if (A.size() == 0) return;
+    Index row = 0;
+    Index col = 0;
+    const double deviation = (A - B).cwiseAbs().maxCoeff(&row, &col);
+    const double largest = B.cwiseAbs().maxCoeff();
+    const double error = deviation / (largest > 1e-3 * bound ? largest : bound);
+    checks_.push_back({name, A(row, col), B(row, col), error, error <= tolerance_});
+  }
+
+  std::vector<InvariantCheck> take() { return std::move(checks_); }
+
+ private:
+  double tolerance_;
+  std::vector<InvariantCheck> checks_;
+};
+
+/// n matrices side by side, so that a family of invariants is one check.
+template <class Matrices>
+MatrixXd side_by_side(const Matrices& family) {
+  if (family.empty()) return {};
+  const Index cols = family.front().cols();
+  MatrixXd all(3, cols * std::ssize(family));
+  for (Index k = 0; k < std::ssize(family); ++k) all.middleCols(k * cols, cols) = family[static_cast<size_t>(k)];
+  return all;
+}
+
+MatrixXd side_by_side(const std::vector<std::vector<Matrix3d>>& family) {
+  std::vector<Matrix3d> flat;
+  for (const auto& row : family) flat.insert(flat.end(), row.begin(), row.end());
+  return side_by_side(flat);
+}
+
+struct Scales {
+  double first = 0;    // m L
+  double inertia = 0;  // largest moment
+  double modal = 0;    // largest Me
+};
+
+Scales scales_of(const ReducedBody& body) {
+  const double inertia = body.J0.diagonal().maxCoeff();
+  return {std::sqrt(body.m * inertia), inertia, body.n() > 0 ? body.Me.diagonal().maxCoeff() : 0};
+}
+
+/// Rigid motions T and the assembled M: T^T M T and T^T M Phi hold all integrals up to first order in S.
+void check_by_rigid_motions(CheckList& list, const ReducedBody& body, const Mesh& mesh, const Assembly& assembly,
+                            const ModalBasis& basis) {
+  const Scales s = scales_of(body);
+  const MatrixXd T = rigid_motions(mesh, assembly.dofs);
+  const MatrixXd M_T = assembly.M * T;
+  const MatrixXd rigid = T.transpose() * M_T;
+  const MatrixXd coupling = M_T.transpose() * basis.Phi;
+  list.compare("m = t^T M t", body.m * Matrix3d::Identity(), rigid.topLeftCorner<3, 3>(), body.m);
+  list.compare("mc0 = t^T M r", -tilde(body.mc0), rigid.topRightCorner<3, 3>(), s.first);
+  list.compare("J0 = r^T M r", body.J0, rigid.bottomRightCorner<3, 3>(), s.inertia);
+  list.compare("Ct = t^T M Phi", body.Ct, coupling.topRows(3), std::sqrt(body.m * s.modal));
+  list.compare("Cr0 = r^T M Phi", body.Cr0, coupling.bottomRows(3), std::sqrt(s.inertia * s.modal));
+  list.compare("Me = Phi^T M Phi", body.Me, basis.Phi.transpose() * (assembly.M * basis.Phi), s.modal);
+}
+
+/// Each integral as it is defined, by a finer quadrature.
+void check_by_quadrature(CheckList& list, const ReducedBody& body, const ReducedBody& finer) {
+  const Scales s = scales_of(body);
+  list.compare("m, finer quadrature", MatrixXd::Constant(1, 1, body.m), MatrixXd::Constant(1, 1, finer.m), body.m);
+  list.compare("mc0, finer quadrature", body.mc0, finer.mc0, s.first);
+  list.compare("J0, finer quadrature", body.J0, finer.J0, s.inertia);
+  list.compare("Ct, finer quadrature", body.Ct, finer.Ct, std::sqrt(body.m * s.modal));
+  list.compare("Cr0, finer quadrature", body.Cr0, finer.Cr0, std::sqrt(s.inertia * s.modal));
+  list.compare("Cr1, finer quadrature", side_by_side(body.Cr1), side_by_side(finer.Cr1), s.modal);
+  list.compare("Me, finer quadrature", body.Me, finer.Me, s.modal);
+  list.compare("J1, finer quadrature", side_by_side(body.J1), side_by_side(finer.J1), std::sqrt(s.inertia * s.modal));
+  list.compare("J2, finer quadrature", side_by_side(body.J2), side_by_side(finer.J2), s.modal);
+}
+
+/// mc(q), J(q) and Cr(q) from the invariants against the integrals over the deformed body.
+void check_deformed(CheckList& list, const ReducedBody& body, const VectorXd& q, const ReducedBody& deformed) {
+  Matrix3d J = body.J0;
+  Matrix3Xd Cr = body.Cr0;
+  for (Index k = 0; k < body.n(); ++k) {
+    const auto kk = static_cast<size_t>(k);
+    J += q(k) * body.J1[kk];
+    Cr += q(k) * body.Cr1[kk];
+    for (Index l = 0; l < body.n(); ++l) J += q(k) * q(l) * body.J2[kk][static_cast<size_t>(l)];
+  }
+  const Scales s = scales_of(deformed);
+  list.compare("mc(q) of the deformed body", body.mc0 + body.Ct * q, deformed.mc0, s.first);
+  list.compare("J(q) of the deformed body", J, deformed.J0, s.inertia);
+  list.compare("Cr(q) of the deformed body", Cr, deformed.Cr0, std::sqrt(s.inertia * s.modal));
+}
+
+/// Identities between invariants: Cr1[k] e_l = -Cr1[l] e_k, tr J2[k][l] = 2 Me_kl, J2 symmetric in k, l.
+void check_identities(CheckList& list, const ReducedBody& body) {
+  const Index n = body.n();
+  const double modal = scales_of(body).modal;
+  MatrixXd Cr1(3, n * n), minus_Cr1(3, n * n), trace(n, n);
+  for (Index k = 0; k < n; ++k) {
+    for (Index l = 0; l < n; ++l) {
+      Cr1.col(k * n + l) = body.Cr1[static_cast<size_t>(k)].col(l);
+      minus_Cr1.col(k * n + l) = -body.Cr1[static_cast<size_t>(l)].col(k);
+      trace(k, l) = body.J2[static_cast<size_t>(k)][static_cast<size_t>(l)].trace();
+    }
+  }
+  list.compare("Cr1 antisymmetric", Cr1, minus_Cr1, modal);
+  list.compare("tr J2 = 2 Me", trace, 2 * body.Me, modal);
+}
+
+/// A seeded q that moves the body by about its own size, so that every order of q counts.
+VectorXd large_deformation(const ReducedBody& body) {
+  std::mt19937 generator(2020);
+  VectorXd q(body.n());
+  for (Index k = 0; k < q.size(); ++k) {
+    const double size = std::sqrt(body.J0.trace() / std::max(body.Me(k, k), 1e-300));
+    q(k) = size * (static_cast<double>(generator()) / 4294967296.0 - 0.5);
+  }
+  return q;
+}
+
+}  // namespace
+
+ReducedBody reduce(const Mesh& mesh, const Assembly& assembly, const ModalBasis& basis, std::string name) {
+  require(basis.Phi.rows() == assembly.dofs.count, "reduce: the basis belongs to another mesh (" +
+                                                       std::to_string(basis.Phi.rows()) + " freedoms, the mesh has " +
+                                                       std::to_string(assembly.dofs.count) + ")");
+  ReducedBody body = blank_body(std::move(name), static_cast<int>(basis.Phi.cols()));
+  body.structure = "beam";
+  body.frame = basis.clamped ? "clamped" : "free";
+  body.full_freedoms = basis.unknowns;
+  set_inertia(body, gram_matrix(mesh, assembly.dofs, basis.Phi));
+  body.Ke = reduced_stiffness(mesh, assembly.dofs, basis.Phi);
+  for (Index k = 0; k < basis.Phi.cols(); ++k) {
+    const std::string kind(name_of(basis.kind[static_cast<size_t>(k)]));
+    body.coordinates.push_back({kind, basis.omega(k) / (2 * std::numbers::pi)});
+  }
+  body.markers = node_markers(mesh, basis.Phi);
+  body.display = display_shape(mesh, assembly.dofs, basis.Phi);
+  body.validate();
+  return body;
+}
+
+std::vector<InvariantCheck> check_invariants(const ReducedBody& body, const Mesh& mesh, const Assembly& assembly,
+                                             const ModalBasis& basis, double tolerance) {
+  CheckList list(tolerance);
+  check_by_rigid_motions(list, body, mesh, assembly, basis);
+  check_by_quadrature(list, body, integrate(mesh, assembly.dofs, basis.Phi, VectorXd::Zero(body.n())));
+  if (body.n() > 0) {
+    const VectorXd q = large_deformation(body);
+    check_deformed(list, body, q, integrate(mesh, assembly.dofs, basis.Phi, q));
+    check_identities(list, body);
+    const VectorXd stiffness = basis.omega.array().square() * body.Me.diagonal().array();
+    list.compare("Ke = omega^2 Me", body.Ke.diagonal().cwiseQuotient(stiffness), VectorXd::Ones(body.n()), 1);
+  }
+  return list.take();
+}
+
+}  // namespace flexboom

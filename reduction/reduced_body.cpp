@@ -1,0 +1,160 @@
+#include "reduction/reduced_body.hpp"
+
+#include "fem/check.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include <cmath>
+#include <utility>
+
+namespace flexboom {
+namespace {
+
+/// Round-off allowed in a quantity built from sums over many points.
+constexpr double round_off = 1e-12;
+
+class Checker {
+ public:
+  explicit Checker(const ReducedBody& body) : body_(body) {}
+
+  void check(bool condition, const std::string& field, const std::string& fault) const {
+    require(condition, "body \"" + body_.name + "\": " + field + " " + fault);
+  }
+
+  template <class Derived>
+  void shape(const Eigen::MatrixBase<Derived>& A, Eigen::Index rows, Eigen::Index cols,
+             const std::string& field) const {
+    check(A.rows() == rows && A.cols() == cols, field,
+          "is " + std::to_string(A.rows()) + " x " + std::to_string(A.cols()) + ", must be " + std::to_string(rows) +
+              " x " + std::to_string(cols));
+    check(A.allFinite(), field, "has entries that are not finite");
+  }
+
+  void count(size_t size, Eigen::Index n, const std::string& field) const {
+    check(static_cast<Eigen::Index>(size) == n, field,
+          "has " + std::to_string(size) + " entries, must have " + std::to_string(n) + " (one per coordinate)");
+  }
+
+  void symmetric(const Eigen::MatrixXd& A, const std::string& field) const {
+    check((A - A.transpose()).norm() <= round_off * A.norm(), field, "must be symmetric");
+  }
+
+ private:
+  const ReducedBody& body_;
+};
+
+void validate_rigid_part(const ReducedBody& body, const Checker& c) {
+  c.check(std::isfinite(body.m) && body.m > 0, "m", "must be positive, is " + std::to_string(body.m));
+  c.shape(body.mc0, 3, 1, "mc0");
+  c.shape(body.J0, 3, 3, "J0");
+  c.symmetric(body.J0, "J0");
+  // Principal moments about the mass centre: not negative, and none greater than the sum of the others (a line mass has
+  // equality).
+  const Eigen::Vector3d r = body.mc0 / body.m;
+  const Eigen::Matrix3d about_centre =
+      body.J0 - body.m * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+  const Eigen::Vector3d principal =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(about_centre, Eigen::EigenvaluesOnly).eigenvalues();
+  const double slack = round_off * body.J0.norm();
+  c.check(principal(0) >= -slack, "J0",
+          "is not an inertia: negative principal moment about the mass centre " + std::to_string(principal(0)));
+  c.check(principal(2) <= principal(0) + principal(1) + slack, "J0",
+          "is not an inertia: a principal moment exceeds the sum of the other two (triangle inequality)");
+}
+
+void validate_flexible_part(const ReducedBody& body, const Checker& c) {
+  const int n = body.n();
+  c.shape(body.Me, n, n, "Me");
+  c.shape(body.Ke, n, n, "Ke");
+  c.shape(body.De, n, n, "De");
+  c.symmetric(body.Me, "Me");
+  c.symmetric(body.Ke, "Ke");
+  c.shape(body.Ct, 3, n, "Ct");
+  c.shape(body.Cr0, 3, n, "Cr0");
+  c.count(body.Cr1.size(), n, "Cr1");
+  c.count(body.J1.size(), n, "J1");
+  c.count(body.J2.size(), n, "J2");
+  c.count(body.coordinates.size(), n, "coordinates");
+  for (size_t k = 0; k < body.Cr1.size(); ++k) {
+    const std::string index = "[" + std::to_string(k) + "]";
+    c.shape(body.Cr1[k], 3, n, "Cr1" + index);
+    c.shape(body.J1[k], 3, 3, "J1" + index);
+    c.count(body.J2[k].size(), n, "J2" + index);
+    for (const Eigen::Matrix3d& J : body.J2[k]) c.shape(J, 3, 3, "J2" + index);
+  }
+  c.check(n == 0 || Eigen::LLT<Eigen::MatrixXd>(body.Me).info() == Eigen::Success, "Me", "must be positive definite");
+}
+
+void validate_points(const ReducedBody& body, const Checker& c) {
+  for (const Marker& marker : body.markers) {
+    c.shape(marker.position, 3, 1, "marker \"" + marker.name + "\" position");
+    c.shape(marker.S, 3, body.n(), "marker \"" + marker.name + "\" S");
+    c.shape(marker.S_theta, 3, body.n(), "marker \"" + marker.name + "\" S_theta");
+  }
+  c.check(body.display.S.size() == static_cast<size_t>(body.display.points.cols()), "display.S",
+          "must have one entry per point");
+  for (const Eigen::Matrix3Xd& S : body.display.S) c.shape(S, 3, body.n(), "display.S");
+}
+
+}  // namespace
+
+void ReducedBody::validate() const {
+  const Checker c(*this);
+  validate_rigid_part(*this, c);
+  validate_flexible_part(*this, c);
+  validate_points(*this, c);
+}
+
+ReducedBody blank_body(std::string name, int n) {
+  ReducedBody body;
+  body.name = std::move(name);
+  body.Ct = body.Cr0 = Eigen::Matrix3Xd::Zero(3, n);
+  body.Me = body.Ke = body.De = Eigen::MatrixXd::Zero(n, n);
+  body.Cr1.assign(static_cast<size_t>(n), body.Ct);
+  body.J1.assign(static_cast<size_t>(n), Eigen::Matrix3d::Zero());
+  body.J2.assign(static_cast<size_t>(n), body.J1);
+  return body;
+}
+
+ReducedBody rigid_body(std::string name, double m, const Eigen::Vector3d& mc0, const Eigen::Matrix3d& J0) {
+  ReducedBody body = blank_body(std::move(name), 0);
+  body.structure = "rigid";
+  body.m = m;
+  body.mc0 = mc0;
+  body.J0 = J0;
+  body.validate();
+  return body;
+}
+
+const Marker& marker(const ReducedBody& body, const std::string& name) {
+  std::string known;
+  for (const Marker& m : body.markers) {
+    if (m.name == name) return m;
+    known += (known.empty() ? "\"" : ", \"") + m.name + "\"";
+  }
+  throw InputError("body \"" + body.name + "\": no marker \"" + name + "\"; it has " +
+                   (known.empty() ? "none" : known));
+}
+
+void apply_damping(ReducedBody& body, const DampingRule& rule) {
+  const std::string where = "body \"" + body.name + "\": damping";
+  for (const double value : {rule.value, rule.alpha, rule.beta}) {
+    require(std::isfinite(value) && value >= 0, where + " must not be negative, got " + std::to_string(value));
+  }
+  if (rule.name == "none") {
+    body.De.setZero(body.n(), body.n());
+  } else if (rule.name == "modal" || rule.name == "loss-factor") {
+    // 2 zeta omega_k Me_kk with omega_k = sqrt(Ke_kk / Me_kk); a loss factor eta damps a resonance as zeta = eta / 2.
+    const double zeta = rule.name == "modal" ? rule.value : rule.value / 2;
+    const Eigen::ArrayXd stiffness = body.Ke.diagonal().array().max(0.0);
+    body.De = (2 * zeta * (stiffness * body.Me.diagonal().array()).sqrt()).matrix().asDiagonal();
+  } else if (rule.name == "rayleigh") {
+    body.De = rule.alpha * body.Me + rule.beta * body.Ke;
+  } else {
+    throw InputError(where + " rule \"" + rule.name +
+                     "\" is unknown; there are \"none\", \"modal\", \"loss-factor\", \"rayleigh\"");
+  }
+}
+
+}  // namespace flexboom
