@@ -1,0 +1,13 @@
+#pragma once
+
+#include "dynamics/integrator.hpp"
+
+namespace flexboom {
+
+/// CVODE's variable-order backward differentiation formulas, Newton with the exact Jacobian in its structured form.
+std::unique_ptr<Stepper> make_cvode_bdf(const System&, const ErrorScale&);
+
+/// CVODE's variable-order Adams-Moulton formulas with the same Newton iteration.
+std::unique_ptr<Stepper> make_cvode_adams(const System&, const ErrorScale&);
+
+}  // namespace flexboom

@@ -1,0 +1,380 @@
+#pragma once
+
+// The equations of motion of a hub with hinged flexible bodies, written once for a scalar T (README, "Equations of motion").
+// Internal to `dynamics`.
+
+#include "dynamics/dual.hpp"
+#include "dynamics/spatial.hpp"
+#include "dynamics/system.hpp"
+
+#include <cmath>
+#include <span>
+#include <vector>
+
+namespace flexboom::equations {
+
+using spatial::Mat3;
+using spatial::Sym3;
+using spatial::Vec3;
+
+/// One non-zero of J1 (component: xx, yy, zz, xy, yz, zx), J2 (the same) or Cr1 (component: x, y, z). A straight boom that bends in one plane
+/// has a handful, a general body n^2 times six: the loops run over what the body has.
+struct Term {
+  int k = 0, l = 0, component = 0;
+  double value = 0;
+};
+
+/// Constants of one appendage, packed for the inner loop. Arrays over modes are contiguous.
+struct Body {
+  int n = 0;
+  double m = 0;
+  Vec3<double> mc0;
+  Sym3<double> J0;
+  std::vector<Vec3<double>> Ct, Cr0;  // n
+  std::vector<Term> Cr1, J1, J2;      // non-zeros
+  std::vector<double> Ke, De;         // n x n
+  std::vector<double> Me_inverse;     // n x n
+  bool diagonal = false;              // Ke, De and Me are diagonal: modes, no constraint shapes
+  std::vector<Vec3<double>> Gt;       // Me^-1 Ct^T, n
+  Sym3<double> Ctt;                   // Ct Me^-1 Ct^T
+
+  size_t row_begin(size_t k) const { return diagonal ? k : 0; }
+  size_t row_end(size_t k) const { return diagonal ? k + 1 : static_cast<size_t>(n); }
+
+  Vec3<double> d;                     // hinge point, hub axes
+  Mat3<double> B;                     // columns stowed, outward, stowed x outward: boom axes at Theta = 0 -> hub axes
+  double cos_threshold = 0, sin_threshold = 0;
+  double stiffness = 0, preload = 0;  // spring torque = preload - stiffness Delta
+  double damping = 0, stop_stiffness = 0;
+  int at = 0;                         // first entry in p
+};
+
+struct Model {
+  double hub_m = 0;
+  Vec3<double> hub_mc;
+  Sym3<double> hub_J;
+  bool fixed_hub = false;
+  std::vector<Body> bodies;
+};
+
+/// Quantities of one body that the second sweep needs again.
+template <class T>
+struct BodyScratch {
+  Mat3<T> A;                   // boom -> hub axes
+  std::vector<Vec3<T>> Cr;     // Cr(q), n
+  std::vector<Vec3<T>> Gw;     // Me^-1 Cr^T, n
+  std::vector<T> b, g;         // modal force and Me^-1 of it, n
+  Vec3<T> t0, w0;              // hinge row after elimination of q
+  T b0{}, inverse_J_left{};
+};
+
+template <class T>
+struct Scratch {
+  std::vector<BodyScratch<T>> bodies;
+
+  explicit Scratch(const Model& model) : bodies(model.bodies.size()) {
+    for (size_t i = 0; i < bodies.size(); ++i) {
+      const auto n = static_cast<size_t>(model.bodies[i].n);
+      bodies[i].Cr.resize(n);
+      bodies[i].Gw.resize(n);
+      bodies[i].b.resize(n);
+      bodies[i].g.resize(n);
+    }
+  }
+};
+
+/// Mass matrix (symmetric, in blocks of translation and rotation) and force of the hub with everything condensed to it, hub axes.
+template <class T>
+struct HubSystem {
+  Sym3<T> tt, ww;
+  Mat3<T> tw;
+  Vec3<T> ft, fw;
+};
+
+/// A (v) A^T of a symmetric matrix.
+template <class T>
+Sym3<T> rotate(const Mat3<T>& A, const Sym3<T>& S) {
+  const Vec3<T> r0 = S * A.row[0], r1 = S * A.row[1], r2 = S * A.row[2];
+  return {dot(A.row[0], r0), dot(A.row[1], r1), dot(A.row[2], r2),
+          dot(A.row[0], r1), dot(A.row[1], r2), dot(A.row[2], r0)};
+}
+
+/// A S A^T of a general matrix.
+template <class T>
+Mat3<T> rotate(const Mat3<T>& A, const Mat3<T>& S) {
+  Mat3<T> r;
+  for (size_t j = 0; j < 3; ++j) {
+    const Vec3<T> c = S * A.row[j];  // S A^T, column j
+    const T x = dot(A.row[0], c), y = dot(A.row[1], c), z = dot(A.row[2], c);
+    (j == 0 ? r.row[0].x : j == 1 ? r.row[0].y : r.row[0].z) = x;
+    (j == 0 ? r.row[1].x : j == 1 ? r.row[1].y : r.row[1].z) = y;
+    (j == 0 ? r.row[2].x : j == 1 ? r.row[2].y : r.row[2].z) = z;
+  }
+  return r;
+}
+
+/// a -= u v^T
+template <class T, class S>
+void subtract_product(Mat3<T>& a, const Vec3<S>& u, const Vec3<T>& v) {
+  a.row[0] -= u.x * v;
+  a.row[1] -= u.y * v;
+  a.row[2] -= u.z * v;
+}
+
+/// Boom axes -> hub axes at gap Delta: B Rz(threshold + Delta).
+template <class T>
+Mat3<T> boom_axes(const Body& body, const T& gap) {
+  using std::cos;
+  using std::sin;
+  const T cd = cos(gap), sd = sin(gap);
+  const T c = body.cos_threshold * cd - body.sin_threshold * sd;
+  const T s = body.sin_threshold * cd + body.cos_threshold * sd;
+  Mat3<T> A;
+  for (size_t i = 0; i < 3; ++i) {
+    const Vec3<double>& b = body.B.row[i];
+    A.row[i] = {b.x * c + b.y * s, b.y * c - b.x * s, T(b.z)};
+  }
+  return A;
+}
+
+/// Torque of the hinge along +Theta (eqs. 16-19).
+template <class T>
+T hinge_torque(const Body& body, const T& gap, const T& rate, bool contact) {
+  const double k = body.stiffness + (contact ? body.stop_stiffness : 0.0);
+  return body.preload - k * gap - body.damping * rate;
+}
+
+/// Component of a symmetric matrix or a vector by its number in Term.
+template <class T>
+T& component(Sym3<T>& a, int i) {
+  T* const entries[] = {&a.xx, &a.yy, &a.zz, &a.xy, &a.yz, &a.zx};
+  return *entries[i];
+}
+template <class T>
+T& component(Vec3<T>& a, int i) {
+  T* const entries[] = {&a.x, &a.y, &a.z};
+  return *entries[i];
+}
+
+/// Inertia of the deformed body: mc(q), J(q), Jdot; Cr(q) goes to the scratch.
+template <class T>
+struct Inertia {
+  Vec3<T> mc;
+  Sym3<T> J, J_dot;
+};
+
+template <class T>
+Inertia<T> inertia_at(const Body& body, const T* q, const T* q_dot, BodyScratch<T>& s) {
+  Inertia<T> r;
+  r.mc = {T(body.mc0.x), T(body.mc0.y), T(body.mc0.z)};
+  r.J = {T(body.J0.xx), T(body.J0.yy), T(body.J0.zz), T(body.J0.xy), T(body.J0.yz), T(body.J0.zx)};
+  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) {
+    r.mc += q[k] * body.Ct[k];
+    s.Cr[k] = {T(body.Cr0[k].x), T(body.Cr0[k].y), T(body.Cr0[k].z)};
+  }
+  for (const Term& t : body.Cr1) component(s.Cr[static_cast<size_t>(t.l)], t.component) += t.value * q[t.k];
+  for (const Term& t : body.J1) {
+    component(r.J, t.component) += t.value * q[t.k];
+    component(r.J_dot, t.component) += t.value * q_dot[t.k];
+  }
+  for (const Term& t : body.J2) {  // symmetric in k, l: d/dt(q_k q_l) summed over both is 2 q_dot_k q_l
+    const T vq = t.value * q[t.l];
+    component(r.J, t.component) += vq * q[t.k];
+    component(r.J_dot, t.component) += 2.0 * (vq * q_dot[t.k]);
+  }
+  return r;
+}
+
+/// Modal forces Q_f - Ke q - De q_dot (FORMULATION 3.1) of one body with angular velocity w in its own axes.
+template <class T>
+void modal_forces(const Body& body, const Vec3<T>& w, const T* q, const T* q_dot, BodyScratch<T>& s) {
+  const auto n = static_cast<size_t>(body.n);
+  for (size_t k = 0; k < n; ++k) {
+    T f = T(0.0);
+    for (size_t l = body.row_begin(k); l < body.row_end(k); ++l)
+      f -= body.Ke[k * n + l] * q[l] + body.De[k * n + l] * q_dot[l];
+    s.b[k] = f;
+  }
+  // 1/2 w^T dJ/dq_k w + 2 w . (Cr1[k] q_dot)
+  const T ww[] = {w.x * w.x, w.y * w.y, w.z * w.z, 2.0 * (w.x * w.y), 2.0 * (w.y * w.z), 2.0 * (w.z * w.x)};
+  for (const Term& t : body.J1) s.b[static_cast<size_t>(t.k)] += (0.5 * t.value) * ww[t.component];
+  for (const Term& t : body.J2) s.b[static_cast<size_t>(t.k)] += t.value * (q[t.l] * ww[t.component]);
+  const T* const wi[] = {&w.x, &w.y, &w.z};
+  for (const Term& t : body.Cr1) s.b[static_cast<size_t>(t.k)] += (2.0 * t.value) * (*wi[t.component] * q_dot[t.l]);
+}
+
+/// First sweep: one body's equations at its own frame acceleration (a, alpha), with q_ddot and Delta_ddot eliminated,
+/// added to the hub's.
+template <class T>
+void condense(const Body& body, const Vec3<T>& w_hub, const T* p, const T* u, bool contact, BodyScratch<T>& s,
+              bool fixed_hub, HubSystem<T>& hub) {
+  const auto n = static_cast<size_t>(body.n);
+  const T* q = p + 1;
+  const T* q_dot = u + 1;
+  const T rate = u[0];
+  s.A = boom_axes(body, p[0]);
+
+  // Angular velocity of the boom, and its frame acceleration when all accelerations of the unknowns are zero.
+  const Vec3<T> w_carried = transposed_product(s.A, w_hub);
+  Vec3<T> w = w_carried;
+  w.z += rate;
+  const Vec3<T> a_bias = transposed_product(s.A, cross(w_hub, cross(w_hub, body.d)));
+  const Vec3<T> alpha_bias = {rate * w_carried.y, -(rate * w_carried.x), T(0.0)};
+
+  const Inertia<T> inertia = inertia_at(body, q, q_dot, s);
+  modal_forces(body, w, q, q_dot, s);
+
+  // Forces less the mass matrix times the bias accelerations (FORMULATION 3, 3.1).
+  Vec3<T> Ct_rate{}, Cr_rate{};
+  for (size_t k = 0; k < n; ++k) {
+    Ct_rate += q_dot[k] * body.Ct[k];
+    Cr_rate += q_dot[k] * s.Cr[k];
+    s.b[k] -= dot(body.Ct[k], a_bias) + dot(s.Cr[k], alpha_bias);
+  }
+  Vec3<T> ft = -(cross(w, cross(w, inertia.mc) + 2.0 * Ct_rate) + body.m * a_bias + cross(alpha_bias, inertia.mc));
+  Vec3<T> fw = -(cross(w, inertia.J * w + Cr_rate) + inertia.J_dot * w + cross(inertia.mc, a_bias) +
+                 inertia.J * alpha_bias);
+
+  // Eliminate q_ddot, then Delta_ddot.
+  s.t0 = {-inertia.mc.y, inertia.mc.x, T(0.0)};
+  s.w0 = {inertia.J.zx, inertia.J.yz, inertia.J.zz};
+  s.b0 = fw.z + hinge_torque(body, p[0], rate, contact);
+  T J_left = inertia.J.zz;
+  for (size_t k = 0; k < n; ++k) {
+    s.Gw[k] = Vec3<T>{};
+    s.g[k] = T(0.0);
+    for (size_t l = body.row_begin(k); l < body.row_end(k); ++l) {
+      s.Gw[k] += body.Me_inverse[k * n + l] * s.Cr[l];
+      s.g[k] += body.Me_inverse[k * n + l] * s.b[l];
+    }
+    const T c = s.Cr[k].z;
+    J_left -= c * s.Gw[k].z;
+    s.t0 -= c * body.Gt[k];
+    s.w0 -= c * s.Gw[k];
+    s.b0 -= c * s.g[k];
+  }
+  s.inverse_J_left = T(1.0) / J_left;
+  if (fixed_hub) return;
+
+  Sym3<T> tt = {T(body.m - body.Ctt.xx), T(body.m - body.Ctt.yy), T(body.m - body.Ctt.zz),
+                T(-body.Ctt.xy),         T(-body.Ctt.yz),         T(-body.Ctt.zx)};
+  const Vec3<T>& mc = inertia.mc;
+  const T zero(0.0);
+  Mat3<T> tw = {{Vec3<T>{zero, mc.z, -mc.y}, Vec3<T>{-mc.z, zero, mc.x}, Vec3<T>{mc.y, -mc.x, zero}}};  // -tilde(mc)
+  Sym3<T> ww = inertia.J;
+  for (size_t k = 0; k < n; ++k) {
+    subtract_product(tw, body.Ct[k], s.Gw[k]);
+    const Vec3<T>& w_k = s.Cr[k];
+    const Vec3<T>& g_k = s.Gw[k];
+    ww.xx -= w_k.x * g_k.x, ww.yy -= w_k.y * g_k.y, ww.zz -= w_k.z * g_k.z;
+    ww.xy -= w_k.x * g_k.y, ww.yz -= w_k.y * g_k.z, ww.zx -= w_k.z * g_k.x;
+    ft -= s.g[k] * body.Ct[k];
+    fw -= s.g[k] * w_k;
+  }
+  subtract_dyad(tt, s.inverse_J_left, s.t0);
+  subtract_dyad(ww, s.inverse_J_left, s.w0);
+  subtract_product(tw, s.t0, s.inverse_J_left * s.w0);
+  const T b_scaled = s.b0 * s.inverse_J_left;
+  ft -= b_scaled * s.t0;
+  fw -= b_scaled * s.w0;
+
+  // To hub axes and about the hub's origin: a = a_hub - d x omega_dot.
+  const Sym3<T> TT = rotate(s.A, tt);
+  const Mat3<T> TW = rotate(s.A, tw);
+  const Vec3<T> FT = s.A * ft;
+  hub.tt += TT;
+  hub.ft += FT;
+  hub.fw += s.A * fw + cross(body.d, FT);
+  hub.ww += rotate(s.A, ww);
+  const Mat3<T> T_full = {{Vec3<T>{TT.xx, TT.xy, TT.zx}, Vec3<T>{TT.xy, TT.yy, TT.yz}, Vec3<T>{TT.zx, TT.yz, TT.zz}}};
+  // TT d~ has rows (d x row)..: (row . d~ v) = row . (d x v) = (row x d) . v
+  Mat3<T> shifted = TW;  // tw - tt d~
+  for (size_t i = 0; i < 3; ++i) {
+    shifted.row[i] -= cross(T_full.row[i], body.d);
+    hub.tw.row[i] += shifted.row[i];
+  }
+  // ww gains d~ tw + (d~ tw)^T - d~ tt d~ = d~ tw' + (d~ tw)^T with tw' = tw - tt d~, and (d~ tw)^T = -tw^T d~.
+  // Column j of tw is (row0_j, row1_j, row2_j); (d~ X)_{ij} = (d x column_j)_i.
+  const Vec3<double>& d = body.d;
+  const auto shift = [&d](const Mat3<T>& X) {
+    return Mat3<T>{{d.y * X.row[2] - d.z * X.row[1], d.z * X.row[0] - d.x * X.row[2], d.x * X.row[1] - d.y * X.row[0]}};
+  };
+  const Mat3<T> left = shift(shifted), right = shift(TW);
+  hub.ww += Sym3<T>{left.row[0].x + right.row[0].x, left.row[1].y + right.row[1].y, left.row[2].z + right.row[2].z,
+                    left.row[0].y + right.row[1].x, left.row[1].z + right.row[2].y, left.row[2].x + right.row[0].z};
+}
+
+/// Solves the 6 x 6 system of the hub by two 3 x 3 Cholesky factorisations in blocks (LDL^T of the whole, unrolled by a loop).
+template <class T>
+void solve_hub(const HubSystem<T>& h, Vec3<T>& a, Vec3<T>& alpha) {
+  const Mat3<T>& c = h.tw;
+  T M[6][6] = {{h.tt.xx}, {h.tt.xy, h.tt.yy}, {h.tt.zx, h.tt.yz, h.tt.zz},
+               {c.row[0].x, c.row[1].x, c.row[2].x, h.ww.xx},
+               {c.row[0].y, c.row[1].y, c.row[2].y, h.ww.xy, h.ww.yy},
+               {c.row[0].z, c.row[1].z, c.row[2].z, h.ww.zx, h.ww.yz, h.ww.zz}};
+  T x[6] = {h.ft.x, h.ft.y, h.ft.z, h.fw.x, h.fw.y, h.fw.z};
+  T inverse[6];
+  for (int j = 0; j < 6; ++j) {  // LDL^T: M[i][j] holds L D until column j is done
+    inverse[j] = T(1.0) / M[j][j];
+    for (int i = j + 1; i < 6; ++i) {
+      const T l = M[i][j] * inverse[j];
+      for (int k = j + 1; k <= i; ++k) M[i][k] -= l * M[k][j];
+      x[i] -= l * x[j];
+    }
+  }
+  for (int j = 5; j >= 0; --j) {
+    for (int i = j + 1; i < 6; ++i) x[j] -= M[i][j] * x[i];
+    x[j] = x[j] * inverse[j];
+  }
+  a = {x[0], x[1], x[2]};
+  alpha = {x[3], x[4], x[5]};
+}
+
+/// u_dot and the acceleration of the hub's origin in hub axes, from p = (Delta, q)... and u = (omega, Delta_dot, q_dot...).
+template <class T>
+void accelerations(const Model& model, const T* p, const T* u, std::span<const char> contact, Scratch<T>& scratch, T* u_dot,
+                   Vec3<T>& a_hub) {
+  HubSystem<T> hub{};
+  Vec3<T> w_hub{};
+  const int base = model.fixed_hub ? 0 : 3;
+  if (!model.fixed_hub) {
+    w_hub = {u[0], u[1], u[2]};
+    hub.tt = {T(model.hub_m), T(model.hub_m), T(model.hub_m), T(0.0), T(0.0), T(0.0)};
+    const Vec3<double>& c = model.hub_mc;
+    hub.tw = {{Vec3<T>{T(0.0), T(c.z), T(-c.y)}, Vec3<T>{T(-c.z), T(0.0), T(c.x)}, Vec3<T>{T(c.y), T(-c.x), T(0.0)}}};
+    const Sym3<double>& J = model.hub_J;
+    hub.ww = {T(J.xx), T(J.yy), T(J.zz), T(J.xy), T(J.yz), T(J.zx)};
+    hub.ft = -cross(w_hub, cross(w_hub, c));
+    hub.fw = -cross(w_hub, J * w_hub);
+  }
+  for (size_t i = 0; i < model.bodies.size(); ++i) {
+    const Body& body = model.bodies[i];
+    condense(body, w_hub, p + body.at, u + base + body.at, contact[i] != 0, scratch.bodies[i], model.fixed_hub, hub);
+  }
+
+  Vec3<T> alpha_hub{};
+  a_hub = Vec3<T>{};
+  if (!model.fixed_hub) {
+    solve_hub(hub, a_hub, alpha_hub);
+    u_dot[0] = alpha_hub.x, u_dot[1] = alpha_hub.y, u_dot[2] = alpha_hub.z;
+  }
+  for (size_t i = 0; i < model.bodies.size(); ++i) {
+    const Body& body = model.bodies[i];
+    BodyScratch<T>& s = scratch.bodies[i];
+    T* out = u_dot + base + body.at;
+    T hinge = s.b0;
+    Vec3<T> a{}, alpha{};
+    if (!model.fixed_hub) {
+      a = transposed_product(s.A, a_hub - cross(body.d, alpha_hub));
+      alpha = transposed_product(s.A, alpha_hub);
+      hinge -= dot(s.t0, a) + dot(s.w0, alpha);
+    }
+    out[0] = hinge * s.inverse_J_left;
+    alpha.z += out[0];
+    for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) {
+      out[1 + k] = s.g[k] - dot(body.Gt[k], a) - dot(s.Gw[k], alpha);
+    }
+  }
+}
+
+}  // namespace flexboom::equations

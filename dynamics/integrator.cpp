@@ -1,0 +1,339 @@
+#include "dynamics/integrator.hpp"
+
+#include "dynamics/cvode.hpp"
+#include "dynamics/rotation.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+
+namespace flexboom {
+
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr std::array<IntegratorMethod, 2> methods = {{
+    {"bdf", "CVODE backward differentiation, order 1-5, Newton with the exact Jacobian", make_cvode_bdf},
+    {"adams", "CVODE Adams-Moulton, order 1-12, Newton with the exact Jacobian", make_cvode_adams},
+}};
+
+const IntegratorMethod& method_named(const std::string& name) {
+  for (const IntegratorMethod& m : methods)
+    if (m.name == name) return m;
+  std::string known;
+  for (const IntegratorMethod& m : methods) known += fmt::format(" '{}'", m.name);
+  throw InputError(fmt::format("integrator '{}' is not known; there are:{}", name, known));
+}
+
+/// The local error asked of each step for an error over the whole run near the tolerance wanted. Errors of undamped motion grow with its
+/// periods, so this is a start, not a promise: a run's error budget measures what was reached.
+constexpr double local_share = 0.05;
+
+/// Sizes that each state's error is measured against: the largest value so far of the group it belongs to, and never less than a
+/// small part of what the energy at the start could make of it (so that a state that starts at zero has a size).
+class Scales {
+ public:
+  Scales(const System& system, const VectorXd& y0, double tolerance, bool rescale)
+      : system_(system), rescale_(rescale), start_attitude_(1, 0, 0, 0) {
+    error_.tolerance = local_share * tolerance;
+    error_.scale = VectorXd::Zero(y0.size());
+    largest_ = VectorXd::Zero(y0.size());
+    if (!system.fixed_hub()) start_attitude_ = y0.segment<4>(system.layout().attitude());
+    floors(y0);
+    observe(y0);
+  }
+
+  const ErrorScale& error() const { return error_; }
+
+  void observe(const VectorXd& y) {
+    const Layout& l = system_.layout();
+    for (size_t i = 0; i < l.body.size(); ++i) {
+      const int at = l.body[i], rate = l.p + l.base + at, n = system_.appendages()[i].body.n();
+      // Gap and rate measure each other: at the stop the gap is zero but the motion is not.
+      raise(at, std::max(std::abs(y[at]), std::abs(y[rate]) * period_[i]));
+      raise(rate, std::max(std::abs(y[rate]), std::abs(y[at]) / period_[i]));
+      for (int k = 1; k <= n; ++k) {
+        raise(at + k, std::abs(y[at + k]));
+        raise(rate + k, std::abs(y[rate + k]));
+      }
+    }
+    raise(l.dissipated(), std::abs(y[l.dissipated()]));
+    if (system_.fixed_hub()) return;
+    for (const int first : {l.u_begin(), l.position(), l.velocity()}) {
+      const double size = y.segment<3>(first).norm();
+      for (int k = 0; k < 3; ++k) raise(first + k, size);
+    }
+    const double angle = rotation_from_start(y).norm();
+    for (int k = 0; k < 4; ++k) raise(l.attitude() + k, std::min(1.0, 0.5 * angle));
+  }
+
+  /// Forgets the past of the hinges when asked to measure their error against recent motion.
+  void restart(const VectorXd& y) {
+    if (!rescale_) return;
+    const int begin = 0, p = system_.layout().p, u = system_.layout().u;
+    largest_.segment(begin, p + u).setZero();
+    error_.scale.segment(begin, p + u) = floor_.segment(begin, p + u) * 1e-50;
+    observe(y);
+  }
+
+ private:
+  Vector3d rotation_from_start(const VectorXd& y) const {
+    Vector4d back = start_attitude_;
+    back.tail<3>() *= -1;
+    return rotation_vector(quaternion_product(back, y.segment<4>(system_.layout().attitude())));
+  }
+
+  void raise(int i, double size) {
+    if (size <= largest_[i]) return;
+    largest_[i] = size;
+    error_.scale[i] = std::max(size, rescale_ ? error_.scale[i] : floor_[i]);
+  }
+
+  /// A small part of the values that all the energy at the start could give each state.
+  void floors(const VectorXd& y0) {
+    constexpr double part = 1e-4;
+    const Layout& l = system_.layout();
+    const Balance b = system_.balance(y0);
+    const double energy = std::max(b.kinetic + b.elastic, 1e-30);
+    floor_ = VectorXd::Constant(y0.size(), part);
+    const double spin = system_.fixed_hub() ? 0 : y0.segment<3>(l.u_begin()).norm();
+    double longest = spin > 0 ? 1 / spin : 0;
+    for (size_t i = 0; i < l.body.size(); ++i) {
+      const Appendage& a = system_.appendages()[i];
+      const int at = l.body[i], rate = l.p + l.base + at;
+      const double J = a.body.J0(2, 2), k = std::max(a.hinge.mechanism.stiffness, 1e-6 * energy);
+      period_.push_back(std::sqrt(J / (k + a.hinge.mechanism.stop_stiffness)));
+      longest = std::max(longest, std::sqrt(J / k));
+      floor_[at] = part * std::max(std::abs(y0[at]), std::sqrt(2 * energy / k));
+      floor_[rate] = part * std::sqrt(2 * energy / J);
+      for (int m = 0; m < a.body.n(); ++m) {
+        floor_[at + 1 + m] = part * std::sqrt(2 * energy / a.body.Ke(m, m));
+        floor_[rate + 1 + m] = part * std::sqrt(2 * energy / a.body.Me(m, m));
+      }
+    }
+    floor_[l.dissipated()] = energy;
+    if (!system_.fixed_hub()) {
+      const double J = system_.hub().J0.trace() / 3, v = std::sqrt(2 * energy / system_.hub().m);
+      floor_.segment<3>(l.u_begin()).setConstant(part * std::sqrt(2 * energy / J));
+      floor_.segment<3>(l.velocity()).setConstant(part * v);
+      floor_.segment<3>(l.position()).setConstant(part * v * std::max(longest, 1e-3));
+      const double turn = part * std::min(1.0, std::sqrt(2 * energy / J) * std::max(longest, 1e-3));
+      // A quaternion's entries are near 1: less than its round-off can not be asked for.
+      floor_.segment<4>(l.attitude()).setConstant(std::max(turn, 1e-14 / error_.tolerance));
+    }
+    error_.scale = floor_;
+  }
+
+  const System& system_;
+  bool rescale_;
+  Vector4d start_attitude_;
+  std::vector<double> period_;
+  VectorXd floor_, largest_;
+  ErrorScale error_;
+};
+
+/// Which stops are closed, which crossings are looked for.
+struct Contacts {
+  std::vector<char> closed, armed;
+  std::vector<double> largest_rate;
+  std::vector<double> settled_since;
+};
+
+/// Stops at the start: closed beyond the threshold; exactly on it, by where the hinge is going.
+Contacts contacts_at_start(const System& system, const VectorXd& y) {
+  const size_t n = system.appendages().size();
+  Contacts c{std::vector<char>(n, 0), std::vector<char>(n, 0), std::vector<double>(n, 0.0), std::vector<double>(n, -1.0)};
+  for (size_t i = 0; i < n; ++i) {
+    const double gap = system.gap(y.data(), static_cast<int>(i)), rate = system.gap_rate(y.data(), static_cast<int>(i));
+    c.armed[i] = system.appendages()[i].hinge.mechanism.stop_stiffness > 0;
+    c.closed[i] = c.armed[i] && (gap > 0 || (gap == 0 && rate > 0));
+  }
+  return c;
+}
+
+void check_options(const IntegratorOptions& o) {
+  require(o.tolerance > 0 && o.tolerance <= 0.1, fmt::format("tolerance {:g} must lie in (0, 0.1]", o.tolerance));
+  require(o.duration > 0 && std::isfinite(o.duration), fmt::format("duration {:g} s must be positive", o.duration));
+  require(o.output_step > 0, fmt::format("output step {:g} s must be positive", o.output_step));
+  require(o.duration / o.output_step < 1e8,
+          fmt::format("{:.3g} output times are too many; choose a longer output step", o.duration / o.output_step));
+}
+
+/// One run: the event loop around a method.
+class Flight {
+ public:
+  Flight(const System& system, const VectorXd& y0, const IntegratorOptions& options)
+      : system_(system),
+        options_(options),
+        settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
+        scales_(system, y0, options.tolerance, options.rescale_at_events),
+        stepper_(method_named(options.method).make(system, scales_.error())),
+        contacts_(contacts_at_start(system, y0)),
+        y_(y0),
+        sample_(y0),
+        crossed_(contacts_.closed.size(), 0) {}
+
+  Trajectory fly() {
+    const auto start = std::chrono::steady_clock::now();
+    record(0.0, y_);
+    stepper_->restart(0.0, y_, contacts_.closed, contacts_.armed);
+    while (t_ < options_.duration && !stopped()) advance();
+    finish(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    return std::move(result_);
+  }
+
+ private:
+  bool stopped() {
+    const bool stop = options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed);
+    result_.summary.interrupted = result_.summary.interrupted || stop;
+    return stop;
+  }
+
+  void advance() {
+    stepper_->step(options_.duration, t_, y_, crossed_);
+    if (++steps_ > options_.max_steps)
+      throw NumericalError(fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t_, options_.duration));
+    if (!y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", t_));
+    write_outputs();
+    scales_.observe(y_);
+    if (switch_contacts()) {
+      if (!system_.fixed_hub()) y_.segment<4>(system_.layout().attitude()).normalize();
+      scales_.restart(y_);
+      stepper_->restart(t_, y_, contacts_.closed, contacts_.armed);
+      ++result_.summary.restarts;
+    }
+    if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
+  }
+
+  void write_outputs() {
+    for (double next = output_time(); next <= t_; next = output_time()) {
+      if (next == t_) {
+        sample_ = y_;
+      } else {
+        stepper_->interpolate(next, sample_);
+      }
+      record(next, sample_);
+    }
+  }
+
+  /// Time of the next output; the last one is the end exactly.
+  double output_time() const {
+    const auto k = static_cast<double>(result_.time.size());
+    const double next = k * options_.output_step;
+    const double last = options_.duration;
+    if (next < last * (1 - 1e-12)) return next;
+    return result_.time.back() < last ? last : std::numeric_limits<double>::infinity();
+  }
+
+  void record(double t, const VectorXd& y) {
+    result_.time.push_back(t);
+    result_.y.push_back(y);
+    if (!system_.fixed_hub()) {
+      auto attitude = result_.y.back().segment<4>(system_.layout().attitude());
+      double& drift = result_.summary.constraint_drift;
+      drift = std::max(drift, std::abs(attitude.norm() - 1));
+      attitude.normalize();
+    }
+    result_.balance.push_back(system_.balance(result_.y.back()));
+  }
+
+  /// Applies crossings and settling. True when something changed and the method must start again.
+  bool switch_contacts() {
+    bool changed = false;
+    for (size_t i = 0; i < crossed_.size(); ++i) {
+      const int hinge = static_cast<int>(i);
+      const double rate = system_.gap_rate(y_.data(), hinge);
+      double& largest = contacts_.largest_rate[i];
+      largest = std::max(largest, std::abs(rate));
+      if (crossed_[i] != 0) {
+        const bool contact = crossed_[i] > 0;
+        y_[system_.layout().body[i]] = 0;  // on the stop, exactly: the root is good to round-off of t
+        contacts_.closed[i] = contact;
+        result_.events.push_back({t_, hinge, contact, rate});
+        changed = true;
+        if (std::abs(rate) < settle_ * largest) settle(i);
+      } else if (contacts_.settled_since[i] >= 0 && std::abs(rate) > 2 * settle_ * largest) {
+        wake(i);
+        changed = true;
+      }
+    }
+    return changed;
+  }
+
+  void settle(size_t i) {
+    contacts_.settled_since[i] = t_;
+    contacts_.armed[i] = 0;
+    contacts_.closed[i] = 0;
+  }
+
+  void wake(size_t i) {
+    contacts_.settled_since[i] = -1;
+    contacts_.armed[i] = 1;
+    contacts_.closed[i] = system_.gap(y_.data(), static_cast<int>(i)) > 0;
+  }
+
+  void finish(double seconds) {
+    IntegrationSummary& s = result_.summary;
+    const StepCounts c = stepper_->counts();
+    s.method = options_.method;
+    s.steps = c.steps;
+    s.rhs_evaluations = c.rhs_evaluations;
+    s.jacobian_evaluations = c.jacobian_evaluations;
+    s.factorisations = c.factorisations;
+    s.newton_iterations = c.newton_iterations;
+    s.error_test_failures = c.error_test_failures;
+    s.seconds = seconds;
+    s.settled = contacts_.settled_since;
+    if (s.interrupted && result_.time.back() < t_) record(t_, y_);
+    conservation(s);
+  }
+
+  /// Energy and momentum balances over the outputs.
+  void conservation(IntegrationSummary& s) const {
+    const Balance& first = result_.balance.front();
+    double energy = 0, gap = 0, dP = 0, dH = 0, P = 0, H = 0;
+    for (size_t i = 0; i < result_.time.size(); ++i) {
+      const Balance& b = result_.balance[i];
+      const double total = b.kinetic + b.elastic + result_.y[i][system_.layout().dissipated()];
+      energy = std::max(energy, std::abs(b.kinetic) + std::abs(b.elastic));
+      gap = std::max(gap, std::abs(total - (first.kinetic + first.elastic)));
+      dP = std::max(dP, (b.momentum - first.momentum).norm());
+      dH = std::max(dH, (b.angular_momentum - first.angular_momentum).norm());
+      P = std::max(P, b.momentum_scale);
+      H = std::max(H, b.angular_momentum_scale);
+    }
+    s.energy_balance = energy > 0 ? gap / energy : 0;
+    if (!system_.fixed_hub()) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
+  }
+
+  const System& system_;
+  const IntegratorOptions& options_;
+  double settle_;
+  Scales scales_;
+  std::unique_ptr<Stepper> stepper_;
+  Contacts contacts_;
+  double t_ = 0;
+  VectorXd y_, sample_;
+  std::vector<int> crossed_;
+  long steps_ = 0;
+  Trajectory result_;
+};
+
+}  // namespace
+
+std::span<const IntegratorMethod> integrator_methods() { return methods; }
+
+Trajectory integrate(const System& system, const VectorXd& y0, const IntegratorOptions& options) {
+  check_options(options);
+  require(y0.size() == system.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
+  return Flight(system, y0, options).fly();
+}
+
+}  // namespace flexboom

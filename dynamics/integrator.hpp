@@ -1,0 +1,104 @@
+#pragma once
+
+#include "dynamics/system.hpp"
+
+#include <Eigen/Core>
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace flexboom {
+
+struct IntegratorOptions {
+  std::string method = "bdf";
+  double tolerance = 1e-6;    // relative error wanted in every output (max over time / max of the output)
+  double duration = 10;       // [s]
+  double output_step = 0.01;  // [s]
+  /// A hinge whose rate at the stop falls below this fraction of its largest rate so far has settled: its crossings are no longer
+  /// located (its stop counts as open) until the rate doubles. Negative: tolerance / 100. Zero: never.
+  double settle = -1;
+  /// Measure the hinge's error against its motion since the last event instead of its largest motion: late, tiny contacts keep
+  /// their relative accuracy. Costs steps.
+  bool rescale_at_events = false;
+  long max_steps = 200'000'000;
+  const std::atomic<bool>* interrupt = nullptr;            // set from outside: stop and return what there is
+  std::function<void(double time, double duration)> progress;  // called now and then
+};
+
+/// A crossing of a stop.
+struct Event {
+  double time = 0;      // [s]
+  int hinge = 0;        // index of the appendage
+  bool contact = true;  // true: touches the stop, false: leaves it
+  double rate = 0;      // hinge rate there [rad/s]
+};
+
+/// What an integration did, and how well it kept what must be kept.
+struct IntegrationSummary {
+  std::string method;
+  long steps = 0;
+  long rhs_evaluations = 0;
+  long jacobian_evaluations = 0;
+  long factorisations = 0;
+  long newton_iterations = 0;
+  long error_test_failures = 0;
+  long restarts = 0;
+  double seconds = 0;
+  double energy_balance = 0;    // max |E + dissipated - E0| / max E
+  double momentum_drift = 0;    // max change of linear and angular momentum, each over its scale
+  double constraint_drift = 0;  // max | |quaternion| - 1 |; the joints are exact in relative coordinates
+  std::vector<double> settled;  // per hinge: time after which its stop was no longer looked at, or -1
+  bool interrupted = false;
+};
+
+struct Trajectory {
+  std::vector<double> time;
+  std::vector<Eigen::VectorXd> y;  // System::layout()
+  std::vector<Balance> balance;
+  std::vector<Event> events;
+  IntegrationSummary summary;
+};
+
+/// Flies the system from y0 at t = 0.
+/// @throws InputError for an unknown method (listing those that exist) or bad options; NumericalError when the method fails.
+Trajectory integrate(const System&, const Eigen::VectorXd& y0, const IntegratorOptions&);
+
+/// What a method needs to weigh an error: |error_i| is measured in units of tolerance * scale_i.
+struct ErrorScale {
+  double tolerance = 1e-7;  // per step
+  Eigen::VectorXd scale;    // one per state, never zero
+};
+
+struct StepCounts {
+  long steps = 0, rhs_evaluations = 0, jacobian_evaluations = 0, factorisations = 0, newton_iterations = 0,
+       error_test_failures = 0;
+};
+
+/// One integration method on one system. Each step is smooth: the contact flags are constant between restarts.
+class Stepper {
+ public:
+  virtual ~Stepper() = default;
+  /// Starts again at (t, y) with these stops closed. Crossings of hinges with armed[i] != 0 end a step.
+  virtual void restart(double t, const Eigen::VectorXd& y, std::span<const char> contact, std::span<const char> armed) = 0;
+  /// One step, not beyond t_end. Fills t and y, and crossed[i] with +1 (gap rises through zero), -1 or 0. When something was crossed, (t, y) is there.
+  virtual void step(double t_end, double& t, Eigen::VectorXd& y, std::span<int> crossed) = 0;
+  /// y within the last step.
+  virtual void interpolate(double t, Eigen::VectorXd& y) = 0;
+  virtual StepCounts counts() const = 0;
+};
+
+struct IntegratorMethod {
+  std::string_view name;
+  std::string_view what;
+  std::unique_ptr<Stepper> (*make)(const System&, const ErrorScale&);
+};
+
+/// The table of methods: "bdf", "adams".
+std::span<const IntegratorMethod> integrator_methods();
+
+}  // namespace flexboom

@@ -1,0 +1,407 @@
+#include "dynamics/system.hpp"
+
+#include "dynamics/rotation.hpp"
+#include "dynamics/workspace.hpp"
+#include "fem/check.hpp"
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+using Eigen::VectorXd;
+using spatial::vec3;
+using spatial::Vec3;
+
+namespace {
+
+/// Boom axes at Theta = 0 -> hub axes.
+Matrix3d hinge_axes(const Hinge& hinge) {
+  Matrix3d B;
+  B << hinge.stowed, hinge.outward, hinge.stowed.cross(hinge.outward);
+  return B;
+}
+
+void check_hinge(const Hinge& h) {
+  constexpr double tolerance = 1e-12;  // directions come from a file or a formula: round-off of a normalisation
+  require(std::abs(h.stowed.norm() - 1) < tolerance && std::abs(h.outward.norm() - 1) < tolerance &&
+              std::abs(h.stowed.dot(h.outward)) < tolerance,
+          fmt::format("hinge {}: 'stowed' and 'outward' must be unit vectors normal to each other", h.name));
+  const HingeMechanism& m = h.mechanism;
+  require(m.stiffness >= 0 && m.damping >= 0 && m.stop_stiffness >= 0,
+          fmt::format("hinge {}: stiffness, damping and stop stiffness must not be negative", h.name));
+}
+
+template <class Pack>
+auto pack_columns(const Eigen::Matrix3Xd& m, Pack pack) {
+  std::vector<Vec3<double>> r;
+  for (Eigen::Index k = 0; k < m.cols(); ++k) r.push_back(pack(m.col(k)));
+  return r;
+}
+
+std::vector<double> row_major(const MatrixXd& m) {
+  std::vector<double> r;
+  for (Eigen::Index i = 0; i < m.rows(); ++i)
+    for (Eigen::Index j = 0; j < m.cols(); ++j) r.push_back(m(i, j));
+  return r;
+}
+
+/// Entries below this share of the largest of their kind are round-off of the reduction.
+constexpr double negligible = 1e-14;
+
+/// Non-zeros of a family of matrices A[k] (or A[k][l]); `entry(k, l, component)` reads it.
+template <class Entry>
+std::vector<equations::Term> non_zeros(int n, int second, int components, Entry entry) {
+  double largest = 0;
+  std::vector<equations::Term> terms;
+  for (int k = 0; k < n; ++k)
+    for (int l = 0; l < second; ++l)
+      for (int c = 0; c < components; ++c) {
+        terms.push_back({k, l, c, entry(static_cast<size_t>(k), l, c)});
+        largest = std::max(largest, std::abs(terms.back().value));
+      }
+  std::erase_if(terms, [=](const equations::Term& t) { return std::abs(t.value) <= negligible * largest; });
+  return terms;
+}
+
+double symmetric_entry(const Matrix3d& m, int component) {
+  constexpr int row[] = {0, 1, 2, 0, 1, 2}, column[] = {0, 1, 2, 1, 2, 0};
+  return m(row[component], column[component]);
+}
+
+bool is_diagonal(const MatrixXd& m) {
+  const VectorXd d = m.diagonal().cwiseAbs().cwiseSqrt();
+  for (Eigen::Index i = 0; i < m.rows(); ++i)
+    for (Eigen::Index j = 0; j < m.cols(); ++j)
+      if (i != j && std::abs(m(i, j)) > 1e-12 * d[i] * d[j]) return false;  // modes are orthogonal to round-off
+  return true;
+}
+
+void pack_invariants(const ReducedBody& b, equations::Body& r) {
+  const auto to_vec = [](const auto& c) { return vec3(c); };
+  r.n = b.n();
+  r.m = b.m;
+  r.mc0 = vec3(b.mc0);
+  r.J0 = spatial::sym3(b.J0);
+  r.Ct = pack_columns(b.Ct, to_vec);
+  r.Cr0 = pack_columns(b.Cr0, to_vec);
+  r.J1 = non_zeros(r.n, 1, 6, [&](size_t k, int, int c) { return symmetric_entry(b.J1[k], c); });
+  r.J2 = non_zeros(r.n, r.n, 6, [&](size_t k, int l, int c) { return symmetric_entry(b.J2[k][static_cast<size_t>(l)], c); });
+  r.Cr1 = non_zeros(r.n, r.n, 3, [&](size_t k, int l, int c) { return b.Cr1[k](c, l); });
+  r.Ke = row_major(b.Ke);
+  r.De = row_major(b.De);
+  r.diagonal = is_diagonal(b.Ke) && is_diagonal(b.De) && is_diagonal(b.Me);
+  const MatrixXd Me_inverse = r.n ? MatrixXd(b.Me.llt().solve(MatrixXd::Identity(r.n, r.n))) : MatrixXd(0, 0);
+  r.Me_inverse = row_major(0.5 * (Me_inverse + Me_inverse.transpose()));
+  r.Gt = pack_columns(b.Ct * Me_inverse, to_vec);
+  r.Ctt = r.n ? spatial::sym3(b.Ct * Me_inverse * b.Ct.transpose()) : spatial::Sym3<double>{};
+}
+
+void pack_hinge(const Hinge& h, equations::Body& r) {
+  const Matrix3d B = hinge_axes(h);
+  r.d = vec3(h.point);
+  for (int i = 0; i < 3; ++i) r.B.row[static_cast<size_t>(i)] = vec3(B.row(i).transpose());
+  const HingeMechanism& m = h.mechanism;
+  r.cos_threshold = std::cos(m.threshold);
+  r.sin_threshold = std::sin(m.threshold);
+  r.stiffness = m.stiffness;
+  r.preload = m.stiffness * (m.rest - m.threshold);
+  r.damping = m.damping;
+  r.stop_stiffness = m.stop_stiffness;
+}
+
+/// M_xx of the appendage must be positive definite with room for round-off, else the hinge acceleration is noise.
+void check_hinge_inertia(const Appendage& a) {
+  const ReducedBody& b = a.body;
+  double J_left = b.J0(2, 2);
+  if (b.n()) J_left -= b.Cr0.row(2).dot(b.Me.llt().solve(b.Cr0.row(2).transpose()));
+  require(J_left > 1e-10 * std::abs(b.J0(2, 2)) && J_left > 0,
+          fmt::format("body {}: its {} modes leave the hinge row an inertia of {:.3g} of {:.3g} kg m^2: too little to "
+                      "compute with; give the body inertia about the hinge, or fewer modes",
+                      b.name, b.n(), J_left, b.J0(2, 2)));
+}
+
+}  // namespace
+
+struct System::Impl {
+  ReducedBody hub;
+  std::vector<Appendage> appendages;
+  bool fixed_hub = false;
+  Layout layout;
+  equations::Model model;
+};
+
+System::System(ReducedBody hub, std::vector<Appendage> appendages, bool fixed_hub) : impl_(std::make_unique<Impl>()) {
+  Impl& s = *impl_;
+  s.fixed_hub = fixed_hub;
+  if (!fixed_hub) {
+    hub.validate();
+    require(hub.n() == 0, "the hub must be rigid; it has " + std::to_string(hub.n()) + " elastic coordinates");
+  }
+  s.model.hub_m = hub.m;
+  s.model.hub_mc = vec3(hub.mc0);
+  s.model.hub_J = spatial::sym3(hub.J0);
+  s.model.fixed_hub = fixed_hub;
+  Layout& l = s.layout;
+  l.base = fixed_hub ? 0 : 3;
+  for (const Appendage& a : appendages) {
+    a.body.validate();
+    check_hinge(a.hinge);
+    check_hinge_inertia(a);
+    equations::Body body;
+    pack_invariants(a.body, body);
+    pack_hinge(a.hinge, body);
+    body.at = l.p;
+    l.body.push_back(l.p);
+    l.p += 1 + body.n;
+    s.model.bodies.push_back(std::move(body));
+  }
+  l.u = l.base + l.p;
+  l.size = l.p + l.u + (fixed_hub ? 0 : 3 + 4 + 3) + 1;
+  s.hub = std::move(hub);
+  s.appendages = std::move(appendages);
+}
+
+System::~System() = default;
+System::System(System&&) noexcept = default;
+
+const ReducedBody& System::hub() const { return impl_->hub; }
+const std::vector<Appendage>& System::appendages() const { return impl_->appendages; }
+bool System::fixed_hub() const { return impl_->fixed_hub; }
+const Layout& System::layout() const { return impl_->layout; }
+
+void WorkspaceDeleter::operator()(Workspace* w) const { delete w; }
+
+WorkspaceHandle System::workspace() const { return WorkspaceHandle(new Workspace(impl_->model, impl_->layout)); }
+
+Matrix3d System::boom_to_hub(int appendage, double angle) const {
+  const Hinge& h = impl_->appendages[static_cast<size_t>(appendage)].hinge;
+  return hinge_axes(h) * Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
+}
+
+State System::at_rest(const std::vector<double>& angles) const {
+  require(angles.size() == impl_->appendages.size(), "one start angle per hinge is needed");
+  State s;
+  s.angle = angles;
+  s.rate.assign(angles.size(), 0.0);
+  for (const Appendage& a : impl_->appendages) {
+    s.q.push_back(VectorXd::Zero(a.body.n()));
+    s.q_dot.push_back(VectorXd::Zero(a.body.n()));
+  }
+  return s;
+}
+
+VectorXd System::pack(const State& s) const {
+  const Layout& l = impl_->layout;
+  VectorXd y = VectorXd::Zero(l.size);
+  for (size_t i = 0; i < impl_->appendages.size(); ++i) {
+    const int n = impl_->appendages[i].body.n(), at = l.body[i], rate = l.u_begin() + l.base + at;
+    y[at] = s.angle[i] - impl_->appendages[i].hinge.mechanism.threshold;
+    y[rate] = s.rate[i];
+    y.segment(at + 1, n) = s.q[i];
+    y.segment(rate + 1, n) = s.q_dot[i];
+  }
+  if (!impl_->fixed_hub) {
+    y.segment<3>(l.u_begin()) = s.omega;
+    y.segment<3>(l.position()) = s.position;
+    y.segment<4>(l.attitude()) = s.attitude.normalized();
+    y.segment<3>(l.velocity()) = s.velocity;
+  }
+  y[l.dissipated()] = s.dissipated;
+  return y;
+}
+
+State System::unpack(const Eigen::Ref<const VectorXd>& y) const {
+  const Layout& l = impl_->layout;
+  State s;
+  for (size_t i = 0; i < impl_->appendages.size(); ++i) {
+    const int n = impl_->appendages[i].body.n(), at = l.body[i], rate = l.u_begin() + l.base + at;
+    s.angle.push_back(y[at] + impl_->appendages[i].hinge.mechanism.threshold);
+    s.rate.push_back(y[rate]);
+    s.q.emplace_back(y.segment(at + 1, n));
+    s.q_dot.emplace_back(y.segment(rate + 1, n));
+  }
+  if (!impl_->fixed_hub) {
+    s.omega = y.segment<3>(l.u_begin());
+    s.position = y.segment<3>(l.position());
+    s.attitude = y.segment<4>(l.attitude());
+    s.velocity = y.segment<3>(l.velocity());
+  }
+  s.dissipated = y[l.dissipated()];
+  return s;
+}
+
+namespace {
+
+/// Power lost in hinge dampers and structural damping [W].
+double dissipated_power(const equations::Model& model, const double* u, int base) {
+  double power = 0;
+  for (const equations::Body& b : model.bodies) {
+    const double* v = u + base + b.at;
+    power += b.damping * v[0] * v[0];
+    const auto n = static_cast<size_t>(b.n);
+    for (size_t k = 0; k < n; ++k)
+      for (size_t l = 0; l < n; ++l) power += v[1 + k] * b.De[k * n + l] * v[1 + l];
+  }
+  return power;
+}
+
+/// 1/2 quaternion * (0, omega).
+void quaternion_rate(const double* q, const double* w, double* q_dot) {
+  q_dot[0] = 0.5 * (-q[1] * w[0] - q[2] * w[1] - q[3] * w[2]);
+  q_dot[1] = 0.5 * (q[0] * w[0] + q[2] * w[2] - q[3] * w[1]);
+  q_dot[2] = 0.5 * (q[0] * w[1] + q[3] * w[0] - q[1] * w[2]);
+  q_dot[3] = 0.5 * (q[0] * w[2] + q[1] * w[1] - q[2] * w[0]);
+}
+
+/// Vector from hub to inertial axes by a quaternion that is unit up to integration error.
+Vector3d to_inertial(const double* q, const Vector3d& a) {
+  const Vector3d v(q[1], q[2], q[3]);
+  const Vector3d t = 2 * v.cross(a);
+  return a + q[0] * t + v.cross(t);
+}
+
+}  // namespace
+
+void System::derivative(const double* y, std::span<const char> contact, Workspace& w, double* y_dot) const {
+  const Layout& l = impl_->layout;
+  const double* u = y + l.u_begin();
+  Vec3<double> a_hub;
+  equations::accelerations(impl_->model, y, u, contact, w.scratch, y_dot + l.u_begin(), a_hub);
+  for (int i = 0; i < l.p; ++i) y_dot[i] = u[l.base + i];
+  if (!impl_->fixed_hub) {
+    for (int i = 0; i < 3; ++i) y_dot[l.position() + i] = y[l.velocity() + i];
+    quaternion_rate(y + l.attitude(), u, y_dot + l.attitude());
+    Eigen::Map<Vector3d>(y_dot + l.velocity()) = to_inertial(y + l.attitude(), spatial::eigen(a_hub));
+  }
+  y_dot[l.dissipated()] = dissipated_power(impl_->model, u, l.base);
+}
+
+void System::jacobian(const double* y, std::span<const char> contact, Workspace& w) const {
+  const Layout& l = impl_->layout;
+  const int inputs = l.p + l.u;
+  for (int i = 0; i < inputs; ++i) w.dual_in[static_cast<size_t>(i)] = Workspace::D(y[i]);
+  for (int first = 0; first < inputs; first += Workspace::lanes) {
+    const int count = std::min(Workspace::lanes, inputs - first);
+    for (int i = 0; i < count; ++i) w.dual_in[static_cast<size_t>(first + i)].d[static_cast<size_t>(i)] = 1;
+    Vec3<Workspace::D> a_hub;
+    equations::accelerations(impl_->model, w.dual_in.data(), w.dual_in.data() + l.p, contact, w.dual_scratch,
+                             w.dual_out.data(), a_hub);
+    for (int i = 0; i < count; ++i) {
+      const auto lane = static_cast<size_t>(i);
+      for (int r = 0; r < l.u; ++r) w.dudot(r, first + i) = w.dual_out[static_cast<size_t>(r)].d[lane];
+      w.dahub.col(first + i) << a_hub.x.d[lane], a_hub.y.d[lane], a_hub.z.d[lane];
+      w.dual_in[static_cast<size_t>(first + i)].d[lane] = 0;
+    }
+    w.a_hub << a_hub.x.v, a_hub.y.v, a_hub.z.v;
+  }
+  w.y = Eigen::Map<const VectorXd>(y, l.size);
+}
+
+// p_dot = E u with E picking the rates, so (I - gamma J) condenses to u: (I - gamma A_u - gamma^2 A_p E) du = r_u + gamma A_p r_p.
+void System::factorise_newton(double gamma, Workspace& w) const {
+  const Layout& l = impl_->layout;
+  w.gamma = gamma;
+  w.newton.noalias() = -gamma * w.dudot.rightCols(l.u);
+  w.newton.rightCols(l.p) -= gamma * gamma * w.dudot.leftCols(l.p);
+  w.newton.diagonal().array() += 1.0;
+  if (!w.newton.allFinite()) throw NumericalError("the Jacobian of the equations of motion is not finite");
+  w.lu.compute(w.newton);
+}
+
+namespace {
+
+/// d(A(quat) a)/d(quat), 3 x 4, for to_inertial.
+Eigen::Matrix<double, 3, 4> rotated_vector_slope(const double* q, const Vector3d& a) {
+  const Vector3d v(q[1], q[2], q[3]);
+  Eigen::Matrix<double, 3, 4> r;
+  r.col(0) = 2 * v.cross(a);
+  r.rightCols<3>() = -2 * q[0] * tilde(a) - 2 * (tilde(v.cross(a)) + tilde(v) * tilde(a));
+  return r;
+}
+
+}  // namespace
+
+void System::solve_newton(const double* b, Workspace& w, double* x) const {
+  const Layout& l = impl_->layout;
+  const double gamma = w.gamma;
+  const Eigen::Map<const VectorXd> r(b, l.size);
+  w.rhs_p = r.head(l.p);
+  w.rhs.noalias() = r.segment(l.p, l.u) + gamma * (w.dudot.leftCols(l.p).lazyProduct(w.rhs_p));
+  w.delta.tail(l.u) = w.lu.solve(w.rhs);
+  w.delta.head(l.p) = w.rhs_p + gamma * w.delta.tail(l.p);
+
+  // The followers, exactly: attitude, velocity, position, dissipated energy depend on p and u, not the other way round.
+  const double* y = w.y.data();
+  const double* u = y + l.u_begin();
+  double dissipated = b[l.dissipated()];
+  for (const equations::Body& body : impl_->model.bodies) {
+    const double* v = u + l.base + body.at;
+    const double* dv = w.delta.data() + l.p + l.base + body.at;
+    const auto n = static_cast<size_t>(body.n);
+    dissipated += gamma * 2 * body.damping * v[0] * dv[0];
+    for (size_t k = 0; k < n; ++k)
+      for (size_t m = 0; m < n; ++m) dissipated += gamma * 2 * v[1 + k] * body.De[k * n + m] * dv[1 + m];
+  }
+  if (!impl_->fixed_hub) {
+    const Vector3d domega = w.delta.segment<3>(l.p);
+    double rate[4];
+    quaternion_rate(y + l.attitude(), domega.data(), rate);
+    const Vector4d rhs = r.segment<4>(l.attitude()) + gamma * Eigen::Map<const Vector4d>(rate);
+    // (I - gamma/2 Omega)^-1 = (I + gamma/2 Omega) / (1 + gamma^2 |omega|^2 / 4), Omega^2 = -|omega|^2 I.
+    quaternion_rate(rhs.data(), u, rate);
+    const double w2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
+    const Vector4d dq = (rhs + gamma * Eigen::Map<const Vector4d>(rate)) / (1 + 0.25 * gamma * gamma * w2);
+    const Vector3d da = w.dahub.lazyProduct(w.delta);
+    const Vector3d dv = r.segment<3>(l.velocity()) + gamma * (to_inertial(y + l.attitude(), da) +
+                                                             rotated_vector_slope(y + l.attitude(), w.a_hub) * dq);
+    const Vector3d dr = r.segment<3>(l.position()) + gamma * dv;
+    Eigen::Map<Vector4d>(x + l.attitude()) = dq;
+    Eigen::Map<Vector3d>(x + l.velocity()) = dv;
+    Eigen::Map<Vector3d>(x + l.position()) = dr;
+  }
+  Eigen::Map<VectorXd>(x, l.p + l.u) = w.delta;
+  x[l.dissipated()] = dissipated;
+}
+
+MatrixXd System::dense_jacobian(const Workspace& w) const {
+  const Layout& l = impl_->layout;
+  MatrixXd J = MatrixXd::Zero(l.size, l.size);
+  J.block(0, l.p + l.base, l.p, l.p).setIdentity();
+  J.block(l.p, 0, l.u, l.p + l.u) = w.dudot;
+  const double* y = w.y.data();
+  for (const equations::Body& body : impl_->model.bodies) {
+    const int at = l.p + l.base + body.at;
+    J(l.dissipated(), at) = 2 * body.damping * y[at];
+    for (int k = 0; k < body.n; ++k)
+      for (int m = 0; m < body.n; ++m)
+        J(l.dissipated(), at + 1 + k) += 2 * body.De[static_cast<size_t>(k * body.n + m)] * y[at + 1 + m];
+  }
+  if (impl_->fixed_hub) return J;
+  J.block<3, 3>(l.position(), l.velocity()).setIdentity();
+  for (int i = 0; i < 3; ++i)
+    quaternion_rate(y + l.attitude(), Vector3d::Unit(i).eval().data(), &J(l.attitude(), l.p + i));
+  for (int i = 0; i < 4; ++i) {
+    const Vector4d e = Vector4d::Unit(i);
+    quaternion_rate(e.data(), y + l.u_begin(), &J(l.attitude(), l.attitude() + i));
+  }
+  for (int i = 0; i < l.p + l.u; ++i)
+    J.block<3, 1>(l.velocity(), i) = to_inertial(y + l.attitude(), w.dahub.col(i));
+  J.block<3, 4>(l.velocity(), l.attitude()) = rotated_vector_slope(y + l.attitude(), w.a_hub);
+  return J;
+}
+
+Vector3d System::tip_displacement(const State& s, int appendage) const {
+  const auto i = static_cast<size_t>(appendage);
+  for (const Marker& m : impl_->appendages[i].body.markers)
+    if (m.name == "tip") return m.S * s.q[i];
+  return Vector3d::Zero();
+}
+
+}  // namespace flexboom

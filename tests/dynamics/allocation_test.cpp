@@ -1,0 +1,51 @@
+#include "dynamics_testing.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+
+// Counts every allocation of this program by standing in front of glibc's malloc; sanitizers have their own malloc.
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+extern "C" void* __libc_malloc(std::size_t);
+extern "C" void* malloc(std::size_t size) {
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  return __libc_malloc(size);
+}
+
+namespace flexboom {
+namespace {
+
+TEST(Allocation, IsCounted) {
+  const long before = allocations;
+  const std::vector<double> v(1000, 1.0);
+  EXPECT_GT(allocations - before, 0) << v.size();
+}
+
+TEST(Allocation, RightHandSideJacobianAndNewtonSolveMakeNone) {
+  Appendage a{eq14::reduced_body(testing::round_boom(0.295, 0.005), 3, eq14::Planes::xy_and_xz, "boom"), {}};
+  a.hinge.mechanism = testing::sport_mechanism(0.35);
+  const System system(rigid_body("hub", 8.5, Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()), {a, a});
+  const auto work = system.workspace();
+  const Eigen::VectorXd y = system.pack(system.at_rest({1.5, 1.5}));
+  Eigen::VectorXd y_dot(y.size());
+  const std::vector<char> contact = {0, 1};
+  const long before = allocations;
+  for (int i = 0; i < 10; ++i) {
+    system.derivative(y.data(), contact, *work, y_dot.data());
+    system.jacobian(y.data(), contact, *work);
+    system.factorise_newton(1e-3, *work);
+    system.solve_newton(y_dot.data(), *work, y_dot.data());
+  }
+  EXPECT_EQ(allocations - before, 0);
+}
+
+}  // namespace
+}  // namespace flexboom
+
+#endif

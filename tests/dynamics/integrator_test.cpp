@@ -1,0 +1,222 @@
+#include "dynamics/integrator.hpp"
+
+#include "dynamics_testing.hpp"
+#include "fem/check.hpp"
+
+#include <gtest/gtest.h>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double pi = std::numbers::pi;
+
+class EveryMethod : public ::testing::TestWithParam<std::string> {};
+
+std::vector<std::string> method_names() {
+  std::vector<std::string> names;
+  for (const IntegratorMethod& m : integrator_methods()) names.emplace_back(m.name);
+  return names;
+}
+INSTANTIATE_TEST_SUITE_P(Table, EveryMethod, ::testing::ValuesIn(method_names()), [](const auto& p) { return p.param; });
+
+/// Boom 2 of SPORT on a hub that does not move: rigid with the inertia of a solid bar, or with eq. 14 modes.
+System boom_2(int modes, double zeta = 0) {
+  ReducedBody body;
+  if (modes == 0) {
+    const double m = 0.01645016453235955, J = 0.0004772175595249452;  // boom_properties.json
+    body = rigid_body("boom", m, Vector3d(m * 0.295 / 2, 0, 0), Vector3d(5.140676416362361e-8, J, J).asDiagonal());
+  } else {
+    body = eq14::reduced_body(testing::round_boom(0.295, 0.005), modes, eq14::Planes::xy, "boom");
+    if (zeta > 0) apply_damping(body, {"modal", zeta});
+  }
+  Hinge hinge;
+  hinge.mechanism = testing::sport_mechanism(0.35);
+  return System(ReducedBody{}, {{body, hinge}}, true);
+}
+
+/// Every contact and release over 10 s keeps its digits, down to motions of 1e-45 rad.
+TEST_P(EveryMethod, RigidBoomOnAFixedHubFollowsTheExactPiecewiseSolution) {
+  const System system = boom_2(0);
+  for (const int side : {3, -3}) {
+    IntegratorOptions o;
+    o.method = GetParam();
+    o.tolerance = 1e-10;
+    o.settle = 0;
+    o.rescale_at_events = true;
+    const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + side * pi / 180})), o);
+    double error = 0;
+    for (const auto& row : testing::read_csv("hinge_angle_boom2.csv")) {
+      const double exact = std::stod(row[side > 0 ? 1 : 3]);
+      const auto i = static_cast<size_t>(std::llround(std::stod(row[0]) / o.output_step));
+      error = std::max(error, std::abs(system.gap(r.y[i].data(), 0) - exact));
+    }
+    EXPECT_LT(error, 1e-9 * 3 * pi / 180) << side;
+    size_t k = 0;
+    double worst = 0;
+    for (const auto& row : testing::read_csv("hinge_events_boom2.csv")) {
+      if (std::stoi(row[2]) != side || std::stod(row[4]) > o.duration) continue;
+      ASSERT_LT(k, r.events.size());
+      worst = std::max(worst, std::abs(r.events[k].time - std::stod(row[4])));
+      EXPECT_EQ(r.events[k].contact, row[6].starts_with("enters"));
+      ++k;
+    }
+    EXPECT_EQ(k, r.events.size());
+    EXPECT_LT(worst, 1e-9) << side;
+  }
+}
+
+TEST_P(EveryMethod, FlexibleBoomOnAFixedHubMeetsTheReference) {
+  for (const char* zeta : {"0.0", "0.05"}) {
+    const System system = boom_2(1, std::stod(zeta));
+    IntegratorOptions o;
+    o.method = GetParam();
+    o.tolerance = 1e-10;
+    o.duration = 1;
+    o.output_step = 0.005;
+    o.settle = 0;
+    o.rescale_at_events = true;  // the last contacts are 1e-4 of the first
+    const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + pi / 60})), o);
+    double gap_error = 0, q_error = 0, gap_size = 0, q_size = 0;
+    for (const auto& row : testing::read_csv("flexible_boom2_fixed_hub.csv")) {
+      if (row[0] != "2" || row[1] != "1" || row[2] != zeta) continue;
+      const auto i = static_cast<size_t>(std::llround(std::stod(row[3]) / o.output_step));
+      if (i >= r.y.size()) continue;
+      const double gap = std::stod(row[4]), q = std::stod(row[6]);
+      gap_error = std::max(gap_error, std::abs(r.y[i][0] - gap));
+      q_error = std::max(q_error, std::abs(r.y[i][1] - q));
+      gap_size = std::max(gap_size, std::abs(gap));
+      q_size = std::max(q_size, std::abs(q));
+    }
+    EXPECT_LT(gap_error, 1e-9 * gap_size) << zeta;
+    EXPECT_LT(q_error, 1e-9 * q_size) << zeta;
+    size_t k = 0;
+    for (const auto& row : testing::read_csv("flexible_boom2_fixed_hub_events.csv")) {
+      if (row[0] != "2" || row[1] != "1" || row[2] != zeta) continue;
+      ASSERT_LT(k, r.events.size());
+      EXPECT_NEAR(r.events[k++].time, std::stod(row[4]), 1e-9);
+    }
+  }
+}
+
+/// Free, undamped, no stop: Delta = Delta_0 cos(omega t).
+TEST_P(EveryMethod, ErrorOfAnOscillatorFollowsTheTolerance) {
+  const System damped = boom_2(0);
+  Appendage a = damped.appendages()[0];
+  a.hinge.mechanism.damping = 0;
+  a.hinge.mechanism.stop_stiffness = 0;
+  const System system(ReducedBody{}, {a}, true);
+  const double omega = std::sqrt(a.hinge.mechanism.stiffness / a.body.J0(2, 2));
+  for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
+    IntegratorOptions o;
+    o.method = GetParam();
+    o.tolerance = tolerance;
+    o.duration = 2;  // 7 periods
+    const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + 0.05})), o);
+    double error = 0;
+    for (size_t i = 0; i < r.time.size(); ++i) error = std::max(error, std::abs(r.y[i][0] - 0.05 * std::cos(omega * r.time[i])));
+    EXPECT_LT(error, 30 * tolerance * 0.05) << tolerance;  // 7 undamped periods add up some thirty local errors
+    EXPECT_EQ(r.events.size(), 0U);
+  }
+}
+
+/// I = (0.134942, 0.10477, 0.05858) tumbling without torque (Jacobi elliptic functions).
+TEST_P(EveryMethod, TorqueFreeTumblingMeetsTheEllipticFunctions) {
+  const System system(rigid_body("hub", 8.5, Vector3d::Zero(), Vector3d(0.134942, 0.10477, 0.05858).asDiagonal()), {});
+  State s = system.at_rest({});
+  s.omega = Vector3d(0.1, 1, 0.05);
+  IntegratorOptions o;
+  o.method = GetParam();
+  o.tolerance = 1e-10;
+  o.duration = 50;
+  o.output_step = 1;
+  const Trajectory r = integrate(system, system.pack(s), o);
+  double rate_error = 0, attitude_error = 0;
+  for (const auto& row : testing::read_csv("torque_free_case_b.csv")) {
+    const auto i = static_cast<size_t>(std::llround(std::stod(row[1])));
+    if (i >= r.time.size()) continue;
+    const State state = system.unpack(r.y[i]);
+    rate_error = std::max(rate_error, (state.omega - Vector3d(std::stod(row[2]), std::stod(row[3]), std::stod(row[4]))).norm());
+    const Eigen::Vector4d q(std::stod(row[5]), std::stod(row[6]), std::stod(row[7]), std::stod(row[8]));
+    attitude_error = std::max(attitude_error, std::min((state.attitude - q).norm(), (state.attitude + q).norm()));
+  }
+  // Unstable about the middle axis: errors grow between the flips, a hundredfold over 50 s.
+  EXPECT_LT(rate_error, 1e-7);
+  EXPECT_LT(attitude_error, 1e-7);
+  EXPECT_LT(r.summary.energy_balance, 1e-8);
+  EXPECT_LT(r.summary.momentum_drift, 1e-8);
+}
+
+TEST(Integrator, OutputsStandOnTheGridAndAtTheEnd) {
+  const System system = boom_2(0);
+  IntegratorOptions o;
+  o.duration = 0.25;
+  o.output_step = 0.1;
+  const Trajectory r = integrate(system, system.pack(system.at_rest({1.5})), o);
+  EXPECT_EQ(r.time, (std::vector<double>{0.0, 0.1, 0.2, 0.25}));
+}
+
+TEST(Integrator, StopsWhenAsked) {
+  const System system = boom_2(0);
+  std::atomic<bool> stop{true};
+  IntegratorOptions o;
+  o.interrupt = &stop;
+  const Trajectory r = integrate(system, system.pack(system.at_rest({1.5})), o);
+  EXPECT_TRUE(r.summary.interrupted);
+  EXPECT_EQ(r.time, (std::vector<double>{0.0}));
+}
+
+TEST(Integrator, StartsBeyondTheStopAndExactlyOnIt) {
+  const System system = boom_2(0);
+  IntegratorOptions o;
+  o.duration = 1;
+  EXPECT_FALSE(integrate(system, system.pack(system.at_rest({pi / 2 + 0.1})), o).events.front().contact);
+  State s = system.at_rest({pi / 2});
+  EXPECT_TRUE(integrate(system, system.pack(s), o).events.empty());
+  s.rate[0] = 1;
+  EXPECT_FALSE(integrate(system, system.pack(s), o).events.front().contact);
+  s.rate[0] = -1;
+  EXPECT_TRUE(integrate(system, system.pack(s), o).events.front().contact);
+}
+
+TEST(Integrator, SettledHingesAreReportedAndNoLongerLogged) {
+  const System system = boom_2(0);
+  IntegratorOptions o;
+  o.tolerance = 1e-6;
+  const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + 0.05})), o);
+  EXPECT_LT(r.events.size(), 25U);
+  EXPECT_GT(r.summary.settled[0], 0);
+  EXPECT_LT(std::abs(r.events.back().rate), 1e-8 * 7);
+}
+
+TEST(Integrator, NamesTheMethodsThatExist) {
+  const System system = boom_2(0);
+  IntegratorOptions o;
+  o.method = "euler";
+  try {
+    integrate(system, system.pack(system.at_rest({1.5})), o);
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("'bdf' 'adams'"), std::string::npos) << e.what();
+  }
+}
+
+TEST(Integrator, RefusesBadOptions) {
+  const System system = boom_2(0);
+  const VectorXd y0 = system.pack(system.at_rest({1.5}));
+  const auto with = [&](auto change) {
+    IntegratorOptions o;
+    change(o);
+    return o;
+  };
+  EXPECT_THROW(integrate(system, y0, with([](auto& o) { o.tolerance = 0; })), InputError);
+  EXPECT_THROW(integrate(system, y0, with([](auto& o) { o.duration = -1; })), InputError);
+  EXPECT_THROW(integrate(system, y0, with([](auto& o) { o.output_step = 1e-12; })), InputError);
+  EXPECT_THROW(integrate(system, VectorXd::Constant(y0.size(), NAN), {}), InputError);
+}
+
+}  // namespace
+}  // namespace flexboom

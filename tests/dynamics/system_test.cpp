@@ -1,0 +1,213 @@
+#include "dynamics/system.hpp"
+
+#include "dynamics/rotation.hpp"
+#include "dynamics_testing.hpp"
+#include "fem/check.hpp"
+
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using testing::PointBody;
+
+/// Two appendages with every invariant non-zero on a hub, a random state, and the point masses as the oracle.
+struct Case {
+  std::mt19937 random{42};
+  std::vector<PointBody> points;
+  Matrix3d J_hub = Vector3d(1.3, 0.9, 0.7).asDiagonal();
+  std::unique_ptr<System> system;
+  VectorXd y;
+  std::vector<char> contact = {1, 0};
+
+  explicit Case(bool fixed_hub = false) {
+    J_hub(0, 1) = J_hub(1, 0) = 0.05;
+    std::vector<Appendage> appendages;
+    for (int i = 0; i < 2; ++i) {
+      points.push_back(testing::random_point_body(random, 7, 3 - i, "body" + std::to_string(i)));
+      Hinge hinge;
+      hinge.point = Vector3d(0.1, -0.2 * i, 0.3);
+      hinge.stowed = Vector3d(0, 0.6, 0.8);
+      hinge.outward = i == 0 ? Vector3d(1, 0, 0) : Vector3d(0, -0.8, 0.6);
+      hinge.mechanism = {0.3, 1.2, 0.02, 9.0, 1.4};
+      appendages.push_back({points.back().body, hinge});
+    }
+    system = std::make_unique<System>(rigid_body("hub", 2.5, Vector3d::Zero(), J_hub), appendages, fixed_hub);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    State s = system->at_rest({1.6, 0.9});
+    const auto noise = [&] { return uniform(random); };
+    for (size_t i = 0; i < 2; ++i) {
+      s.rate[i] = noise();
+      s.q[i] = 0.2 * VectorXd::NullaryExpr(s.q[i].size(), noise);
+      s.q_dot[i] = VectorXd::NullaryExpr(s.q[i].size(), noise);
+    }
+    s.omega = Vector3d::NullaryExpr(noise);
+    s.velocity = Vector3d::NullaryExpr(noise);
+    s.position = Vector3d::NullaryExpr(noise);
+    s.attitude = Eigen::Vector4d::NullaryExpr(noise).normalized();
+    if (fixed_hub) {
+      s.omega.setZero(), s.velocity.setZero(), s.position.setZero(), s.attitude = {1, 0, 0, 0};
+    }
+    y = system->pack(s);
+  }
+
+  VectorXd derivative(const VectorXd& state) const {
+    const auto work = system->workspace();
+    VectorXd y_dot(state.size());
+    system->derivative(state.data(), contact, *work, y_dot.data());
+    return y_dot;
+  }
+};
+
+/// u_dot and hub acceleration by virtual power over the point masses: no invariant is formed.
+VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub) {
+  const State s = c.system->unpack(c.y);
+  const Layout& l = c.system->layout();
+  const int n = 3 + l.u;  // hub translation (hub axes), then u
+  MatrixXd M = MatrixXd::Zero(n, n);
+  VectorXd f = VectorXd::Zero(n);
+  M.topLeftCorner<3, 3>() = c.system->hub().m * Matrix3d::Identity();
+  M.block<3, 3>(3, 3) = c.J_hub;
+  f.segment<3>(3) = -s.omega.cross(c.J_hub * s.omega);
+  for (size_t i = 0; i < c.points.size(); ++i) {
+    const PointBody& p = c.points[i];
+    const Appendage& a = c.system->appendages()[i];
+    const Matrix3d C = c.system->boom_to_hub(static_cast<int>(i), s.angle[i]);
+    const Vector3d z = Vector3d::UnitZ();
+    const int at = 6 + l.body[i], modes = p.body.n();
+    for (size_t k = 0; k < p.dm.size(); ++k) {
+      const Vector3d x = p.u0[k] + p.S[k] * s.q[i], x_dot = p.S[k] * s.q_dot[i];
+      const Vector3d r = a.hinge.point + C * x, r_dot = C * (s.rate[i] * z.cross(x) + x_dot);
+      MatrixXd B = MatrixXd::Zero(3, n);
+      B.leftCols<3>().setIdentity();
+      B.middleCols<3>(3) = -tilde(r);
+      B.col(at) = C * z.cross(x);
+      B.middleCols(at + 1, modes) = C * p.S[k];
+      const Vector3d bias = s.omega.cross(s.omega.cross(r)) + 2 * s.omega.cross(r_dot) +
+                            C * (s.rate[i] * s.rate[i] * z.cross(z.cross(x)) + 2 * s.rate[i] * z.cross(x_dot));
+      M += p.dm[k] * B.transpose() * B;
+      f -= p.dm[k] * B.transpose() * bias;
+    }
+    const HingeMechanism& h = a.hinge.mechanism;
+    f[at] += h.stiffness * (h.rest - s.angle[i]) - h.damping * s.rate[i];
+    if (c.contact[i]) f[at] -= h.stop_stiffness * (s.angle[i] - h.threshold);
+    f.segment(at + 1, modes) -= p.body.Ke * s.q[i] + p.body.De * s.q_dot[i];
+  }
+  const VectorXd acceleration = M.lu().solve(f);
+  a_hub = acceleration.head<3>();
+  return acceleration.tail(l.u);
+}
+
+TEST(System, AccelerationsAgreeWithVirtualPowerOverPointMasses) {
+  const Case c;
+  Vector3d a_hub;
+  const VectorXd expected = oracle_accelerations(c, a_hub);
+  const VectorXd y_dot = c.derivative(c.y);
+  const Layout& l = c.system->layout();
+  // Round-off of a solve with a condition number near 1e3.
+  EXPECT_LT((y_dot.segment(l.p, l.u) - expected).norm(), 1e-12 * expected.norm());
+  const Vector3d inertial = rotation_matrix(c.system->unpack(c.y).attitude) * a_hub;
+  EXPECT_LT((y_dot.segment<3>(l.velocity()) - inertial).norm(), 1e-12 * inertial.norm());
+}
+
+TEST(System, BodyMadeOfPointsHasConsistentInvariants) { EXPECT_NO_THROW(Case().points[0].body.validate()); }
+
+TEST(System, JacobianAgreesWithCentralDifferences) {
+  for (const bool fixed : {false, true}) {
+    const Case c(fixed);
+    const auto work = c.system->workspace();
+    c.system->jacobian(c.y.data(), c.contact, *work);
+    const MatrixXd J = c.system->dense_jacobian(*work);
+    const double h = 1e-5;
+    for (Eigen::Index i = 0; i < c.y.size(); ++i) {
+      VectorXd plus = c.y, minus = c.y;
+      plus[i] += h;
+      minus[i] -= h;
+      const VectorXd column = (c.derivative(plus) - c.derivative(minus)) / (2 * h);
+      // Truncation h^2 f''' and round-off eps / h, both near 1e-9 of the largest entries (about 1e2).
+      EXPECT_LT((J.col(i) - column).cwiseAbs().maxCoeff(), 1e-7) << "column " << i << (fixed ? ", fixed hub" : "");
+    }
+  }
+}
+
+TEST(System, NewtonSolveInvertsIMinusGammaJ) {
+  for (const bool fixed : {false, true}) {
+    const Case c(fixed);
+    const auto work = c.system->workspace();
+    c.system->jacobian(c.y.data(), c.contact, *work);
+    const double gamma = 0.37;
+    c.system->factorise_newton(gamma, *work);
+    const VectorXd b = VectorXd::LinSpaced(c.y.size(), -1, 2);
+    VectorXd x(b.size());
+    c.system->solve_newton(b.data(), *work, x.data());
+    const MatrixXd A = MatrixXd::Identity(b.size(), b.size()) - gamma * c.system->dense_jacobian(*work);
+    EXPECT_LT((A * x - b).norm(), 1e-11 * (A.norm() * x.norm()));  // round-off of one LU
+  }
+}
+
+/// d/dt of a function of the state along the motion, by a central difference.
+template <class F>
+auto rate_of(const Case& c, F f) {
+  const double h = 1e-6;
+  const VectorXd y_dot = c.derivative(c.y);
+  return ((f(c.y + h * y_dot) - f(c.y - h * y_dot)) / (2 * h)).eval();
+}
+
+TEST(System, PowerBalances) {
+  const Case c;
+  const auto energy = [&](const VectorXd& y) {
+    const Balance b = c.system->balance(y);
+    return Eigen::Matrix<double, 1, 1>(b.kinetic + b.elastic + y[c.system->layout().dissipated()]);
+  };
+  EXPECT_NEAR(rate_of(c, energy)[0], 0, 1e-8);  // energies near 1 J, difference step 1e-6: truncation 1e-12 f''', round-off 1e-10
+}
+
+TEST(System, MomentaAreConserved) {
+  const Case c;
+  EXPECT_LT(rate_of(c, [&](const VectorXd& y) { return c.system->balance(y).momentum; }).norm(), 1e-8);
+  EXPECT_LT(rate_of(c, [&](const VectorXd& y) { return c.system->balance(y).angular_momentum; }).norm(), 1e-8);
+}
+
+TEST(System, MotionIsTheSameSeenFromAnotherInertialFrame) {
+  const Case c;
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.8, Vector3d(1, 2, -1).normalized()));
+  State s = c.system->unpack(c.y);
+  s.attitude = quaternion_product({turn.w(), turn.x(), turn.y(), turn.z()}, s.attitude);
+  s.velocity = turn * s.velocity;
+  s.position = turn * s.position + Vector3d(3, -4, 5);
+  const VectorXd y_dot = c.derivative(c.y), turned = c.derivative(c.system->pack(s));
+  const Layout& l = c.system->layout();
+  EXPECT_LT((turned.head(l.p + l.u) - y_dot.head(l.p + l.u)).norm(), 1e-13 * y_dot.norm());
+  EXPECT_LT((turned.segment<3>(l.velocity()) - turn * y_dot.segment<3>(l.velocity())).norm(), 1e-13 * y_dot.norm());
+}
+
+TEST(System, RigidBodiesAreBodiesWithoutModes) {
+  std::mt19937 random(7);
+  const PointBody p = testing::random_point_body(random, 9, 0, "rigid");
+  const System system(rigid_body("hub", 2.0, Vector3d::Zero(), Matrix3d::Identity()), {{p.body, Hinge{}}});
+  EXPECT_EQ(system.layout().size, 1 + 4 + 10 + 1);
+  const auto work = system.workspace();
+  VectorXd y = system.pack(system.at_rest({1.0})), y_dot(y.size());
+  system.derivative(y.data(), std::vector<char>{0}, *work, y_dot.data());
+  EXPECT_EQ(y_dot.norm(), 0.0);  // nothing pushes
+}
+
+TEST(System, SaysWhatIsWrongWithItsParts) {
+  const ReducedBody hub = rigid_body("hub", 1.0, Vector3d::Zero(), Matrix3d::Identity());
+  Appendage a{eq14::reduced_body(testing::round_boom(0.295, 0.005), 2, eq14::Planes::xy, "boom"), {}};
+  Appendage tilted = a;
+  tilted.hinge.outward = Vector3d(0.1, 1, 0).normalized();
+  EXPECT_THROW(System(hub, {tilted}), InputError);
+  Appendage negative = a;
+  negative.hinge.mechanism.damping = -1;
+  EXPECT_THROW(System(hub, {negative}), InputError);
+  EXPECT_THROW(System(a.body, {a}), InputError);  // a hub with elastic coordinates
+}
+
+}  // namespace
+}  // namespace flexboom
