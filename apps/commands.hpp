@@ -1,0 +1,53 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace flexboom {
+
+/// Exit codes promised to scripts.
+enum ExitCode : int { exit_ok = 0, exit_usage = 2, exit_input = 3, exit_numerical = 4, exit_check_failed = 5, exit_interrupted = 130 };
+
+/// Options that every command has.
+struct CommonOptions {
+  bool json = false;
+  bool quiet = false;
+  std::filesystem::path out;
+  int threads = 1;
+};
+
+struct RunArguments {
+  std::string scene;
+  std::optional<double> duration, tolerance, output_step, vtu_step;
+  std::optional<std::string> modes, structure, formulation, integrator;
+  bool report = false;
+  bool no_budget = false;
+};
+
+struct ModesArguments {
+  std::string model;
+  int count = 10;
+  std::string backend = "arpack";
+  std::optional<std::string> clamp;     // node set; the body's own by default
+  std::optional<std::string> material;  // "E,nu,rho"
+  bool free = false;
+  std::filesystem::path vtu;
+};
+
+struct CompareArguments {
+  std::string body;  // body file, scene file or built-in scene
+  int count = 10;
+  double tolerance = 1e-10;
+  int elements = 8;
+  bool no_transient = false;
+};
+
+// One function per command; each returns its exit code and throws InputError or NumericalError.
+int run_command(const RunArguments&, const CommonOptions&);
+int check_command(const std::string& scene, const CommonOptions&);
+int modes_command(const ModesArguments&, const CommonOptions&);
+int compare_command(const CompareArguments&, const CommonOptions&);
+int report_command(const std::filesystem::path& folder, const CommonOptions&);
+
+}  // namespace flexboom

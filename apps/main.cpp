@@ -1,0 +1,125 @@
+#include "apps/commands.hpp"
+#include "apps/version.hpp"
+#include "fem/check.hpp"
+
+#include <CLI/CLI.hpp>
+#include <Eigen/Core>
+#include <fmt/format.h>
+
+#include <csignal>
+#include <cstdio>
+#include <functional>
+
+namespace {
+
+using namespace flexboom;
+
+/// The command line of the whole program. `action` is set by the sub-command that was given.
+struct CommandLine {
+  CLI::App app{"flexboom turns the geometry of a boom into a reduced flexible body, and flies that body."};
+  CommonOptions common;
+  RunArguments run;
+  ModesArguments modes;
+  CompareArguments compare;
+  std::string checked;
+  std::filesystem::path reported;
+  std::function<int()> action;
+
+  CommandLine() {
+    app.set_version_flag("--version", version_text());
+    app.require_subcommand(1);
+    add_run();
+    add_check();
+    add_modes();
+    add_compare();
+    add_report();
+  }
+
+  CLI::App* command(const std::string& name, const std::string& what) {
+    CLI::App* c = app.add_subcommand(name, what);
+    c->add_flag("--json", common.json, "One JSON document on stdout, nothing else");
+    c->add_flag("--quiet", common.quiet, "No progress and no summary");
+    c->add_option("--out", common.out, "Output folder");
+    c->add_option("--threads", common.threads, "Threads of the linear algebra")->check(CLI::Range(1, 1024));
+    c->set_version_flag("--version", version_text());
+    return c;
+  }
+
+  void add_run() {
+    CLI::App* c = command("run", "scene -> models -> transient -> results folder");
+    c->add_option("SCENE", run.scene, "Scene file, or the name of a built-in scene (sport)")->required();
+    c->add_option("--duration", run.duration, "Simulated time [s]");
+    c->add_option("--tolerance", run.tolerance, "Relative error wanted in the outputs");
+    c->add_option("--modes", run.modes, "Elastic coordinates of every body: a number, or auto");
+    c->add_option("--structure", run.structure, "Model of every body: eq14, beam or rigid");
+    c->add_option("--formulation", run.formulation, "relative");
+    c->add_option("--integrator", run.integrator, "Integration method");
+    c->add_option("--output-step", run.output_step, "Time between rows of trajectory.csv [s]");
+    c->add_option("--vtu-step", run.vtu_step, "Time between .vtu files [s]; none by default");
+    c->add_flag("--report", run.report, "Write report.html too");
+    c->add_flag("--no-budget", run.no_budget, "Do not repeat the run to measure its errors");
+    c->callback([this] { action = [this] { return run_command(run, common); }; });
+  }
+
+  void add_check() {
+    CLI::App* c = command("check", "Reads and checks everything, computes nothing, lists all faults");
+    c->add_option("SCENE", checked, "Scene or body file, or the name of a built-in scene")->required();
+    c->callback([this] { action = [this] { return check_command(checked, common); }; });
+  }
+
+  void add_modes() {
+    CLI::App* c = command("modes", "Eigenfrequencies and mode shapes of a body");
+    c->add_option("MODEL", modes.model, "Body file (.toml)")->required();
+    c->add_option("--count", modes.count, "Number of modes");
+    c->add_option("--backend", modes.backend, "Eigen-solver: arpack, spectra or dense");
+    c->add_option("--clamp", modes.clamp, "Node set that is fixed (default: the body's)");
+    c->add_option("--material", modes.material, "E,nu,rho of every segment, instead of the file's");
+    c->add_flag("--free", modes.free, "No clamp");
+    c->add_option("--vtu", modes.vtu, "Write the shapes to this .vtu file");
+    c->callback([this] { action = [this] { return modes_command(modes, common); }; });
+  }
+
+  void add_compare() {
+    CLI::App* c = command("compare", "FE modes, S and invariants against eq. 14 and the closed forms");
+    c->add_option("BODY", compare.body, "Body file, scene file, or the name of a built-in scene")->required();
+    c->add_option("--count", compare.count, "Bending modes to compare")->check(CLI::Range(1, 50));
+    c->add_option("--tolerance", compare.tolerance, "Largest relative error; above it the exit code is 5");
+    c->add_option("--elements", compare.elements, "Elements per boom")->check(CLI::Range(1, 10000));
+    c->add_flag("--no-transient", compare.no_transient, "Of a scene, compare the bodies only");
+    c->callback([this] { action = [this] { return compare_command(compare, common); }; });
+  }
+
+  void add_report() {
+    CLI::App* c = command("report", "results folder -> one self-contained HTML file");
+    c->add_option("DIR", reported, "Results folder of a run")->required();
+    c->callback([this] { action = [this] { return report_command(reported, common); }; });
+  }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::signal(SIGPIPE, SIG_IGN);
+#ifdef SIGXFSZ
+  std::signal(SIGXFSZ, SIG_IGN);  // a full quota is an error of write(), not a death
+#endif
+  try {
+    CommandLine line;
+    try {
+      line.app.parse(argc, argv);
+    } catch (const CLI::ParseError& e) {
+      return line.app.exit(e) == 0 ? exit_ok : exit_usage;
+    }
+    Eigen::setNbThreads(line.common.threads);
+    return line.action();
+  } catch (const InputError& e) {
+    fmt::print(stderr, "error: {}\n", e.what());
+    return exit_input;
+  } catch (const NumericalError& e) {
+    fmt::print(stderr, "error: {}\n", e.what());
+    return exit_numerical;
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "internal error: {}\n", e.what());
+    return exit_numerical;
+  }
+}

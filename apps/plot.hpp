@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+struct Curve {
+  std::string name;
+  std::vector<double> x, y;
+};
+
+struct Plot {
+  std::string title, x_label, y_label;
+  std::vector<Curve> curves;
+  int width = 760, height = 280;
+  bool log_x = false, log_y = false;
+};
+
+/// A line plot as one <svg> element: axes with round ticks, a legend, at most about 2000 points a curve (extremes of each bin are kept).
+std::string svg(const Plot&);
+
+}  // namespace flexboom

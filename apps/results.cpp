@@ -1,0 +1,219 @@
+#include "apps/results.hpp"
+
+#include "apps/version.hpp"
+#include "dynamics/rotation.hpp"
+#include "fem/check.hpp"
+#include "fem/vtk.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <numbers>
+
+namespace flexboom {
+
+namespace fs = std::filesystem;
+using Eigen::Matrix3d;
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+using nlohmann::ordered_json;
+
+namespace {
+
+std::string reason() { return errno != 0 ? std::strerror(errno) : "unknown reason"; }
+
+}  // namespace
+
+void write_file(const fs::path& path, const std::string& text) {
+  fs::path temporary = path;
+  temporary += ".part";
+  errno = 0;
+  std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
+  out.write(text.data(), static_cast<std::streamsize>(text.size()));
+  out.close();
+  if (!out) {
+    const std::string why = reason();
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+    throw InputError(fmt::format("cannot write {}: {}", path.string(), why));
+  }
+  std::error_code error;
+  fs::rename(temporary, path, error);
+  if (error) throw InputError(fmt::format("cannot write {}: {}", path.string(), error.message()));
+}
+
+void prepare_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  require(!error, fmt::format("cannot make the output folder {}: {}", folder.string(), error.message()));
+  const fs::path probe = folder / ".flexboom-probe";
+  write_file(probe, "");
+  fs::remove(probe, error);
+}
+
+std::string trajectory_csv(const OutputTable& table) {
+  fmt::memory_buffer out;
+  fmt::format_to(std::back_inserter(out), "{}\n", fmt::join(table.names, ","));
+  for (Eigen::Index row = 0; row < table.values.rows(); ++row)
+    for (Eigen::Index c = 0; c < table.values.cols(); ++c)
+      fmt::format_to(std::back_inserter(out), "{:.17g}{}", table.values(row, c), c + 1 < table.values.cols() ? ',' : '\n');
+  return fmt::to_string(out);
+}
+
+std::string events_csv(const System& system, const Trajectory& motion) {
+  std::string out = "time,hinge,kind\n";
+  for (const Event& e : motion.events)
+    out += fmt::format("{:.17g},{},{}\n", e.time, system.appendages()[static_cast<size_t>(e.hinge)].body.name,
+                       e.contact ? "contact" : "release");
+  return out;
+}
+
+namespace {
+
+ordered_json budget_json(const ErrorBudget& b) {
+  if (!b.measured) return {{"discretisation", nullptr}, {"truncation", nullptr}, {"time", nullptr}, {"linearisation", nullptr}, {"total", nullptr}};
+  return {{"discretisation", b.discretisation}, {"truncation", b.truncation}, {"time", b.time}, {"linearisation", b.linearisation}, {"total", b.total()}};
+}
+
+ordered_json bodies_json(const RunResult& r) {
+  ordered_json bodies = ordered_json::array();
+  for (const PreparedBody& p : r.bodies) {
+    std::vector<double> hz;
+    for (const Coordinate& c : p.body.coordinates) hz.push_back(c.frequency_hz);
+    bodies.push_back({{"name", p.body.name}, {"structure", p.body.structure}, {"dofs", p.dofs}, {"modes", p.body.n()},
+                      {"frequencies_hz", hz}, {"mass", p.body.m}});
+  }
+  return bodies;
+}
+
+ordered_json checks_json(const RunResult& r) {
+  ordered_json checks = ordered_json::array();
+  for (const PreparedBody& p : r.bodies)
+    for (const InvariantCheck& c : p.checks)
+      checks.push_back({{"name", p.body.name + "." + c.name}, {"value", c.value}, {"reference", c.reference},
+                        {"relative_error", c.relative_error}, {"passed", c.passed}});
+  return checks;
+}
+
+}  // namespace
+
+ordered_json summary_json(const RunResult& r, double write_seconds) {
+  const IntegrationSummary& s = r.trajectory.summary;
+  ordered_json j;
+  j["scene"] = r.scene.name;
+  j["version"] = version;
+  j["seconds"] = {{"prepare", r.prepare_seconds}, {"integrate", r.integrate_seconds}, {"write", write_seconds},
+                  {"budget", r.budget_seconds},
+                  {"total", r.prepare_seconds + r.integrate_seconds + write_seconds + r.budget_seconds}};
+  j["steps"] = s.steps;
+  j["rhs_evaluations"] = s.rhs_evaluations;
+  j["jacobian_evaluations"] = s.jacobian_evaluations;
+  j["factorisations"] = s.factorisations;
+  j["events"] = r.trajectory.events.size();
+  j["restarts"] = s.restarts;
+  j["real_time_factor"] = r.trajectory.time.back() / std::max(r.integrate_seconds, 1e-9);
+  j["interrupted"] = s.interrupted;
+  j["simulated_seconds"] = r.trajectory.time.back();
+  j["integrator"] = s.method;
+  j["tolerance"] = r.scene.tolerance;
+  j["energy_balance"] = s.energy_balance;
+  j["momentum_drift"] = s.momentum_drift;
+  j["constraint_drift"] = s.constraint_drift;
+  j["error_budget"] = budget_json(r.budget);
+  j["plan"] = r.plan;
+  j["warnings"] = r.warnings;
+  j["bodies"] = bodies_json(r);
+  j["invariant_checks"] = checks_json(r);
+  return j;
+}
+
+Pose pose_at(const Scene& scene, const System& system, const Eigen::VectorXd& y) {
+  const State s = system.unpack(y);
+  const Matrix3d A = scene.hub.fixed ? Matrix3d::Identity() : rotation_matrix(s.attitude);
+  Pose pose;
+  pose.hub.resize(3, 8);
+  for (int c = 0; c < 8; ++c) {  // VTK's order of a hexahedron
+    const Vector3d corner((c & 1) != ((c >> 1) & 1) ? 0.5 : -0.5, (c & 2) ? 0.5 : -0.5, (c & 4) ? 0.5 : -0.5);
+    pose.hub.col(c) = s.position + A * corner.cwiseProduct(scene.hub.size);
+  }
+  for (size_t b = 0; b < system.appendages().size(); ++b) {
+    const Appendage& a = system.appendages()[b];
+    const Matrix3d C = A * system.boom_to_hub(static_cast<int>(b), s.angle[b]);
+    Matrix3Xd points = a.body.display.points, moved = Matrix3Xd::Zero(3, points.cols());
+    for (Eigen::Index i = 0; i < points.cols(); ++i) {
+      if (a.body.n()) moved.col(i) = C * (a.body.display.S[static_cast<size_t>(i)] * s.q[b]);
+      points.col(i) = s.position + A * a.hinge.point + C * points.col(i) + moved.col(i);
+    }
+    pose.booms.push_back(std::move(points));
+    pose.deflection.push_back(std::move(moved));
+  }
+  return pose;
+}
+
+namespace {
+
+constexpr int vtk_polyline = 4, vtk_hexahedron = 12;
+
+/// The whole scene at one time as one grid; cell data "body" numbers hub and booms from 0.
+VtkGrid grid_of(const Pose& pose, const System& system) {
+  VtkGrid grid;
+  Eigen::Index total = pose.hub.cols();
+  for (const Matrix3Xd& boom : pose.booms) total += boom.cols();
+  grid.points.resize(3, total);
+  Eigen::MatrixXd displacement = Eigen::MatrixXd::Zero(3, total);
+  std::vector<double> body;
+  grid.points.leftCols(8) = pose.hub;
+  grid.cells.push_back({vtk_hexahedron, {0, 1, 2, 3, 4, 5, 6, 7}});
+  body.push_back(0);
+  Eigen::Index at = 8;
+  for (size_t b = 0; b < pose.booms.size(); ++b) {
+    grid.points.middleCols(at, pose.booms[b].cols()) = pose.booms[b];
+    displacement.middleCols(at, pose.booms[b].cols()) = pose.deflection[b];
+    for (const std::vector<int>& line : system.appendages()[b].body.display.lines) {
+      VtkGrid::Cell cell{vtk_polyline, line};
+      for (int& p : cell.points) p += static_cast<int>(at);
+      grid.cells.push_back(std::move(cell));
+      body.push_back(static_cast<double>(b + 1));
+    }
+    at += pose.booms[b].cols();
+  }
+  grid.point_data.emplace_back("displacement", displacement);
+  grid.cell_data.emplace_back("body", Eigen::Map<Eigen::RowVectorXd>(body.data(), static_cast<Eigen::Index>(body.size())));
+  return grid;
+}
+
+}  // namespace
+
+void write_motion(const RunResult& r, const fs::path& folder) {
+  const Flyable f = make_system(r.scene, r.bodies);
+  std::vector<std::pair<double, std::string>> frames;
+  double next = 0;
+  for (size_t i = 0; i < r.trajectory.time.size(); ++i) {
+    const double t = r.trajectory.time[i];
+    if (t < next - 1e-9 * r.scene.vtu_step) continue;
+    next += r.scene.vtu_step * std::max(1.0, std::ceil((t - next) / r.scene.vtu_step + 1e-9));
+    const std::string name = fmt::format("motion_{:05d}.vtu", frames.size());
+    write_vtu(folder / name, grid_of(pose_at(r.scene, f.system, r.trajectory.y[i]), f.system));
+    frames.emplace_back(t, name);
+  }
+  write_pvd(folder / "motion.pvd", frames);
+}
+
+void write_results(const RunResult& r, const fs::path& folder) {
+  const auto start = std::chrono::steady_clock::now();
+  const Flyable f = make_system(r.scene, r.bodies);
+  write_file(folder / "scene.toml", to_toml(r.scene));
+  write_file(folder / "trajectory.csv", trajectory_csv(r.outputs));
+  write_file(folder / "events.csv", events_csv(f.system, r.trajectory));
+  if (r.scene.vtu_step > 0) write_motion(r, folder);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  write_file(folder / "summary.json", summary_json(r, seconds).dump(2) + "\n");
+}
+
+}  // namespace flexboom

@@ -1,0 +1,41 @@
+#pragma once
+
+#include "apps/simulate.hpp"
+
+#include <nlohmann/json_fwd.hpp>
+
+#include <filesystem>
+#include <string>
+
+namespace flexboom {
+
+/// Makes the folder and proves that it can be written to. @throws InputError.
+void prepare_folder(const std::filesystem::path&);
+
+/// Writes a file whole or not at all: to a temporary name first, renamed when every byte is on its way to the disk.
+/// @throws InputError naming the file and the reason (no space, no permission, ...).
+void write_file(const std::filesystem::path&, const std::string& text);
+
+/// trajectory.csv and events.csv, 17 significant digits.
+std::string trajectory_csv(const OutputTable&);
+std::string events_csv(const System&, const Trajectory&);
+
+/// Keys of summary.json.
+nlohmann::ordered_json summary_json(const RunResult&, double write_seconds);
+
+/// scene.toml, trajectory.csv, events.csv, summary.json, and motion.pvd with its .vtu files when the scene has a vtu_step.
+/// @throws InputError as write_file.
+void write_results(const RunResult&, const std::filesystem::path& folder);
+
+/// motion.pvd and motion_NNNN.vtu: hub box and deformed booms in inertial axes.
+void write_motion(const RunResult&, const std::filesystem::path& folder);
+
+/// Points of the hub's box and the deformed booms at a state, inertial axes [m]; used by the VTU files and the report.
+struct Pose {
+  Eigen::Matrix3Xd hub;                  // 8 corners
+  std::vector<Eigen::Matrix3Xd> booms;   // one curve each
+  std::vector<Eigen::Matrix3Xd> deflection;  // elastic displacement at the same points, inertial axes
+};
+Pose pose_at(const Scene&, const System&, const Eigen::VectorXd& y);
+
+}  // namespace flexboom

@@ -1,0 +1,169 @@
+#include "apps/commands.hpp"
+#include "apps/report.hpp"
+#include "apps/results.hpp"
+#include "dynamics/integrator.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include <atomic>
+#include <charconv>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+
+namespace flexboom {
+
+namespace {
+
+std::atomic<bool> interrupted{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only touch lock-free atomics");
+
+extern "C" void on_interrupt(int) { interrupted.store(true, std::memory_order_relaxed); }
+
+/// Ctrl-C ends the integration in order while one of these lives; a second Ctrl-C kills.
+class InterruptGuard {
+ public:
+  InterruptGuard() {
+    struct sigaction action = {};
+    action.sa_handler = on_interrupt;
+    action.sa_flags = SA_RESETHAND;
+    sigaction(SIGINT, &action, &before_int_);
+    sigaction(SIGTERM, &action, &before_term_);
+  }
+  ~InterruptGuard() {
+    sigaction(SIGINT, &before_int_, nullptr);
+    sigaction(SIGTERM, &before_term_, nullptr);
+  }
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+
+ private:
+  struct sigaction before_int_ = {}, before_term_ = {};
+};
+
+/// One line on a terminal: percent, simulated / wall time, time left. Silent for work under a second and where stderr is no terminal.
+class ProgressLine {
+ public:
+  explicit ProgressLine(bool wanted) : wanted_(wanted && isatty(STDERR_FILENO) == 1) {}
+  ~ProgressLine() {
+    if (shown_) fmt::print(stderr, "\r{:70}\r", "");
+  }
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  void operator()(double time, double duration) {
+    if (!wanted_) return;
+    const auto now = std::chrono::steady_clock::now();
+    const double wall = std::chrono::duration<double>(now - start_).count();
+    if (wall < 1 || now - last_ < std::chrono::milliseconds(200)) return;
+    last_ = now;
+    shown_ = true;
+    fmt::print(stderr, "\r{:3.0f} %  {:.3g} of {:.3g} s simulated in {:.1f} s, {:.1f} s left   ", 100 * time / duration, time, duration, wall,
+               wall * (duration - time) / std::max(time, 1e-12));
+    std::fflush(stderr);
+  }
+
+ private:
+  bool wanted_, shown_ = false;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_ = start_;
+};
+
+void override_modes(Scene& scene, const std::string& text) {
+  int n = 0;
+  if (text != "auto") {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), n);
+    require(error == std::errc() && end == text.data() + text.size() && n >= 0,
+            fmt::format("--modes: '{}' is neither a number of modes nor auto", text));
+  }
+  for (BodyScene& b : scene.bodies) {
+    b.modes_auto = text == "auto";
+    if (!b.modes_auto) b.modes = n;
+  }
+}
+
+Scene scene_of(const RunArguments& a) {
+  Scene scene = load_scene(a.scene);
+  if (a.duration) scene.duration = *a.duration;
+  if (a.tolerance) scene.tolerance = *a.tolerance;
+  if (a.output_step) scene.output_step = *a.output_step;
+  if (a.vtu_step) scene.vtu_step = *a.vtu_step;
+  if (a.integrator) scene.integrator = *a.integrator;
+  if (a.formulation) scene.formulation = *a.formulation;
+  if (a.modes) override_modes(scene, *a.modes);
+  if (a.structure)
+    for (BodyScene& b : scene.bodies) b.structure = *a.structure;
+  if (a.no_budget) scene.error_budget = false;
+  validate(scene);
+  return scene;
+}
+
+void print_summary(const RunResult& r, const std::filesystem::path& folder) {
+  const IntegrationSummary& s = r.trajectory.summary;
+  for (const std::string& line : r.plan) fmt::print("{}\n", line);
+  fmt::print("\n{:g} s in {:.3f} s ({:.0f} times real time): {} steps, {} evaluations, {} events\n", r.trajectory.time.back(),
+             r.integrate_seconds, r.trajectory.time.back() / std::max(r.integrate_seconds, 1e-9), s.steps, s.rhs_evaluations,
+             r.trajectory.events.size());
+  fmt::print("energy balance {:.1e}, momentum drift {:.1e} (relative)\n", s.energy_balance, s.momentum_drift);
+  if (r.budget.measured)
+    fmt::print("errors of the outputs: discretisation {:.1e}, truncation {:.1e}, time {:.1e}, linearisation {:.1e}; total {:.1e}\n",
+               r.budget.discretisation, r.budget.truncation, r.budget.time, r.budget.linearisation, r.budget.total());
+  fmt::print("results: {}\n", folder.string());
+}
+
+}  // namespace
+
+int run_command(const RunArguments& a, const CommonOptions& common) {
+  const Scene scene = scene_of(a);
+  const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results") / scene.name : common.out;
+  prepare_folder(folder);
+  if (!common.quiet)
+    for (const std::string& w : scene.warnings) fmt::print(stderr, "warning: {}\n", w);
+
+  const InterruptGuard guard;
+  ProgressLine progress(!common.quiet && !common.json);
+  const RunResult result = run_scene(scene, {&interrupted, [&progress](double t, double T) { progress(t, T); }});
+  write_results(result, folder);
+  if (a.report) {
+    write_file(folder / "report.html", report_html(folder));
+    write_file(folder / "overview.svg", overview_svg(folder));
+  }
+  if (common.json) {
+    fmt::print("{}\n", summary_json(result, 0).dump(2));
+  } else if (!common.quiet) {
+    print_summary(result, folder);
+    if (a.report) fmt::print("report: {}\n", (folder / "report.html").string());
+  }
+  if (!result.trajectory.summary.interrupted) return exit_ok;
+  if (!common.quiet) fmt::print(stderr, "interrupted at t = {:g} s; what was computed is in {}\n", result.trajectory.time.back(), folder.string());
+  return exit_interrupted;
+}
+
+int check_command(const std::string& name, const CommonOptions& common) {
+  const Scene scene = load_scene(name);
+  validate(scene);
+  if (common.json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"scene", scene.name}, {"bodies", scene.bodies.size()}, {"hinges", scene.hinges.size()},
+                                              {"warnings", scene.warnings}, {"ok", true}}.dump(2));
+    return exit_ok;
+  }
+  for (const std::string& w : scene.warnings) fmt::print(stderr, "warning: {}\n", w);
+  if (!common.quiet) fmt::print("{}: {} bodies, {} hinges: no faults\n", scene.name, scene.bodies.size(), scene.hinges.size());
+  return exit_ok;
+}
+
+int report_command(const std::filesystem::path& folder, const CommonOptions& common) {
+  const std::filesystem::path file = (common.out.empty() ? folder : common.out) / "report.html";
+  if (!common.out.empty()) prepare_folder(common.out);
+  write_file(file, report_html(folder));
+  if (common.json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"report", file.string()}}.dump(2));
+  } else if (!common.quiet) {
+    fmt::print("report: {}\n", file.string());
+  }
+  return exit_ok;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,402 @@
+#include "apps/scene.hpp"
+
+#include "apps/scene_keys.hpp"
+#include "apps/toml_reader.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using scene_keys::Dimension;
+using toml_reader::Faults;
+using toml_reader::TableReader;
+using toml_reader::Value;
+
+constexpr double pi = std::numbers::pi;
+constexpr double repairable_skew = 0.02;       // of the largest entry of an inertia; misprints, not other matrices
+constexpr double repairable_direction = 1e-6;  // of a direction: rounding by hand
+constexpr size_t max_file_size = 16 << 20;     // [bytes]; no scene, but whatever was taken for one
+
+/// What reading fills besides the values.
+struct Reading {
+  Faults faults;
+  std::vector<std::string> warnings;
+  std::filesystem::path folder;  // that `file` of a body is relative to
+};
+
+std::string read_text(const std::filesystem::path& path) {
+  std::error_code error;
+  require(!std::filesystem::is_directory(path, error), path.string() + ": is a folder; give a file");
+  std::ifstream file(path, std::ios::binary);
+  require(file.good(), fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));
+  std::string text(max_file_size + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  require(!file.bad(), path.string() + ": cannot be read");
+  text.resize(static_cast<size_t>(file.gcount()));
+  require(text.size() <= max_file_size, path.string() + ": is larger than 16 MB; that is no scene or body file");
+  return text;
+}
+
+bool is_blank(const std::string& text) { return text.find_first_not_of(" \t\r\n") == std::string::npos; }
+
+/// The parsed file. The faults of a file of another format are not worth listing.
+Value parse_format(const std::string& text, const std::string& file, std::string_view format) {
+  require(!is_blank(text),
+          fmt::format("{}:1:1: the file is empty; its first key must be format = \"{}\"", file, format));
+  Value root = toml_reader::parse(text, file);
+  for (const auto& [key, value] : root.entries) {
+    const bool other = key == "format" && value.kind == Value::Kind::text && value.text != format;
+    require(!other, fmt::format("{}:{}:{}: format: is {}; this version reads \"{}\" here", file, value.place.line,
+                                value.place.column, toml_reader::quoted(value.text), format));
+  }
+  return root;
+}
+
+void read_format(TableReader& table, std::string_view format) {
+  const std::string wanted = fmt::format("the first key must be format = \"{}\"", format);
+  if (!table.has("format")) return table.fault("format", "is missing; " + wanted);
+  table.text("format");
+  if (table.value().entries.front().first != "format") table.fault("format", "stands behind other keys; " + wanted);
+}
+
+Matrix3d read_inertia(TableReader& table, std::string_view key, const std::optional<Matrix3d>& otherwise,
+                      Reading& reading) {
+  const Matrix3d inertia = table.matrix(key, otherwise);
+  const double scale = inertia.cwiseAbs().maxCoeff();
+  const double skew = (inertia - inertia.transpose()).cwiseAbs().maxCoeff();
+  if (!(skew > 0 && skew <= repairable_skew * scale)) return inertia;
+  reading.warnings.push_back(
+      fmt::format("{}: not symmetric (entries across the diagonal differ by up to {:g} kg m^2); "
+                  "(I + I^T)/2 is used",
+                  table.path(key), skew));
+  return 0.5 * (inertia + inertia.transpose());
+}
+
+// --- bodies ---
+
+SectionShape read_shape(TableReader& table, std::string_view name_of_shape, SectionShape shape, bool all_optional) {
+  for (const Dimension& d : scene_keys::dimensions(shape)) {
+    *d.value = table.number(d.key, d.optional || all_optional ? std::optional(*d.value) : std::nullopt);
+  }
+  if (all_optional) table.reject_unknown(fmt::format(" (the end of a {})", name_of_shape));
+  return shape;
+}
+
+// Without a known shape it is not known either which other keys belong here; some faultless section then takes the
+// place.
+void read_sections(TableReader& table, BeamSegment& segment) {
+  const size_t none = scene_keys::shapes.size();
+  const size_t shape = table.choice("shape", scene_keys::shapes, none);
+  if (!table.has("shape")) {
+    table.fault("shape", fmt::format("is missing; it must be one of \"{}\"", fmt::join(scene_keys::shapes, "\", \"")));
+  }
+  if (shape == none) {
+    segment.start = segment.end = GeneralSection{1, 1, 1, 1, 1, 1};
+    return;
+  }
+  const std::string_view name = scene_keys::shapes[shape];
+  segment.start = read_shape(table, name, scene_keys::blank_shape(shape), false);
+  segment.end = segment.start;
+  if (auto end = table.table("end")) segment.end = read_shape(*end, name, segment.start, true);
+  table.reject_unknown(fmt::format(" (for shape \"{}\")", name));
+}
+
+BeamSegment read_segment(TableReader table) {
+  BeamSegment segment;
+  segment.length = table.number("length");
+  segment.elements = table.integer("elements", segment.elements);
+  if (auto material = table.table("material", true)) {
+    segment.material = {material->number("E"), material->number("nu"), material->number("rho")};
+    material->reject_unknown();
+  }
+  read_sections(table, segment);
+  return segment;
+}
+
+RigidAttachment read_attachment(TableReader table, double boom_length, Reading& reading) {
+  RigidAttachment attachment;
+  attachment.name = table.text("name", attachment.name);
+  if (table.is_text("position")) {
+    if (table.text("position") != "tip") {
+      table.fault("position", "is the string " + toml_reader::quoted(table.text("position")) +
+                                  "; it must be a distance from the root [m], or \"tip\"");
+    }
+    attachment.position = boom_length > 0 ? boom_length : 0;  // a faulty length is reported where it stands
+  } else {
+    attachment.position = table.number("position");
+  }
+  attachment.mass = table.number("mass");
+  attachment.inertia = read_inertia(table, "inertia", attachment.inertia, reading);
+  attachment.offset = table.vector("offset", attachment.offset);
+  table.reject_unknown();
+  return attachment;
+}
+
+ShearRule read_shear(TableReader& table, const ShearRule& otherwise) {
+  if (!table.has("shear")) return otherwise;
+  if (!table.is_text("shear")) return {"value", table.number("shear")};
+  return {table.text("shear"), 0};
+}
+
+BeamGeometry read_geometry(TableReader& table, Reading& reading) {
+  BeamGeometry boom;
+  const auto theory = static_cast<size_t>(boom.theory);
+  boom.theory = static_cast<BeamTheory>(table.choice("theory", scene_keys::theories, theory));
+  boom.shear = read_shear(table, boom.shear);
+  boom.rotary_inertia = table.boolean("rotary_inertia", boom.rotary_inertia);
+  boom.order = table.integer("order", boom.order);
+  for (TableReader& segment : table.tables("segments")) boom.segments.push_back(read_segment(segment));
+  for (TableReader& attachment : table.tables("attachments")) {
+    boom.attachments.push_back(read_attachment(attachment, boom.length(), reading));
+  }
+  return boom;
+}
+
+DampingRule read_damping(TableReader& table, const DampingRule& otherwise) {
+  auto damping = table.table("damping");
+  if (!damping) return otherwise;
+  DampingRule rule;
+  rule.name = damping->text("rule");
+  const bool by_value = rule.name == "modal" || rule.name == "loss-factor";
+  rule.value = damping->number("value", by_value ? std::nullopt : std::optional(rule.value));
+  rule.alpha = damping->number("alpha", rule.alpha);
+  rule.beta = damping->number("beta", rule.beta);
+  damping->reject_unknown();
+  return rule;
+}
+
+/// What a scene may also say of a body whose geometry comes from a file.
+void read_model(TableReader& table, BodyScene& body) {
+  body.structure = table.text("structure", body.structure);
+  body.clamp = table.text("clamp", body.clamp);
+  if (table.is_text("modes")) {
+    body.modes_auto = table.text("modes") == "auto";
+    if (!body.modes_auto) {
+      table.fault("modes", "is the string " + toml_reader::quoted(table.text("modes")) +
+                               "; it must be a whole number, or \"auto\"");
+    }
+  } else {
+    body.modes_auto = body.modes_auto && !table.has("modes");
+    body.modes = table.integer("modes", body.modes);
+  }
+  body.directions = table.text("directions", body.directions);
+  body.backend = table.text("backend", body.backend);
+  body.damping = read_damping(table, body.damping);
+}
+
+BodyScene read_whole_body(TableReader& table, Reading& reading) {
+  BodyScene body;
+  body.name = table.text("name");
+  read_model(table, body);
+  body.geometry = read_geometry(table, reading);
+  return body;
+}
+
+// Key paths of the body file become those of the entry that names it, each with its own place.
+BodyScene read_body_file(const std::filesystem::path& path, const std::string& key_path, Reading& reading) {
+  const Value root = parse_format(read_text(path), path.string(), scene_keys::body_format);
+  TableReader table(root, key_path, reading.faults);
+  read_format(table, scene_keys::body_format);
+  BodyScene body = read_whole_body(table, reading);
+  table.reject_unknown();
+  return body;
+}
+
+// The entry's own keys come after those of its file. A file that cannot be read is a fault of the whole entry.
+BodyScene read_body_from_file(TableReader& entry, Reading& reading) {
+  BodyScene body;
+  if (!entry.is_text("file")) {
+    reading.faults.add(entry.path(), entry.place("file"), "file: is not a string; it must be the name of a body file");
+    return body;
+  }
+  try {
+    body = read_body_file(reading.folder / entry.text("file"), entry.path(), reading);
+  } catch (const InputError& error) {
+    reading.faults.add(entry.path(), entry.place("file"), fmt::format("file: {}", error.what()));
+  }
+  reading.faults.locate(entry.path(), entry.value().place);
+  body.name = entry.text("name", body.name);
+  read_model(entry, body);
+  entry.reject_unknown(" (its geometry comes from the body file)");
+  return body;
+}
+
+BodyScene read_body_entry(TableReader table, Reading& reading) {
+  if (table.has("file")) return read_body_from_file(table, reading);
+  BodyScene body = read_whole_body(table, reading);
+  table.reject_unknown();
+  return body;
+}
+
+void warn_of_rigid(const BodyScene& body, const std::string& path, bool modes_given,
+                   std::vector<std::string>& warnings) {
+  if (body.structure == "rigid" && modes_given) warnings.push_back(path + ": has no effect with structure = \"rigid\"");
+}
+
+// --- hinges ---
+
+// Directions are rounded by hand (0.70710678) or by arithmetic. What is off by no more is made orthonormal; what
+// already is so to round-off stays bit for bit, so that a scene that was written out reads back the same.
+Vector3d unit_direction(const Vector3d& v) {
+  const double error = std::abs(v.norm() - 1);
+  constexpr double round_off = 4 * std::numeric_limits<double>::epsilon();
+  return error > round_off && error <= repairable_direction ? v.normalized() : v;
+}
+
+Vector3d normal_to(const Vector3d& outward, const Vector3d& stowed) {
+  const double cosine = std::abs(outward.dot(stowed));
+  constexpr double round_off = 8 * std::numeric_limits<double>::epsilon();
+  if (!(cosine > round_off && cosine <= repairable_direction)) return outward;
+  return (outward - outward.dot(stowed) * stowed).normalized();
+}
+
+double read_stiffness(TableReader& table, double threshold) {
+  const bool has_P1 = table.has("P1"), has_stiffness = table.has("stiffness");
+  if (!has_P1 && !has_stiffness)
+    table.fault("P1", "is missing; give P1 [N m] or stiffness = P1 / threshold [N m/rad], 0 for no spring");
+  if (has_P1 && has_stiffness)
+    table.fault("stiffness", "is given beside P1; stiffness = P1 / threshold, so give one of them");
+  if (!has_P1) return has_stiffness ? table.number("stiffness") : 0;
+  const double P1 = table.number("P1");
+  if (!(std::isfinite(P1) && P1 >= 0)) table.fault("P1", fmt::format("is {} N m; it must be zero or positive", P1));
+  if (threshold <= 0) table.fault("threshold", fmt::format("is {} rad; with P1 it must be positive", threshold));
+  return threshold > 0 && P1 >= 0 ? P1 / threshold : 0;
+}
+
+HingeScene read_hinge(TableReader table) {
+  HingeScene hinge;
+  HingeMechanism& mechanism = hinge.hinge.mechanism;
+  hinge.body = hinge.hinge.name = table.text("body");
+  hinge.hinge.point = table.vector("point");
+  hinge.hinge.stowed = unit_direction(table.vector("stowed"));
+  hinge.hinge.outward = normal_to(unit_direction(table.vector("outward")), hinge.hinge.stowed);
+  mechanism.threshold = table.number("threshold", mechanism.threshold);
+  mechanism.rest = table.number("rest", mechanism.rest);
+  mechanism.stiffness = read_stiffness(table, mechanism.threshold);
+  mechanism.damping = table.number("P2", mechanism.damping);
+  mechanism.stop_stiffness = table.number("P3", mechanism.stop_stiffness);
+  hinge.start_angle = table.number("start_angle", mechanism.rest);
+  hinge.start_rate = table.number("start_rate", hinge.start_rate);
+  table.reject_unknown();
+  return hinge;
+}
+
+// --- scene ---
+
+void read_accuracy(TableReader table, Scene& scene) {
+  scene.tolerance = table.number("tolerance", scene.tolerance);
+  scene.outputs = table.texts("outputs", scene.outputs);
+  scene.error_budget = table.boolean("budget", scene.error_budget);
+  table.reject_unknown();
+}
+
+void read_integrator(TableReader table, Scene& scene) {
+  scene.integrator = table.text("method", scene.integrator);
+  scene.formulation = table.text("formulation", scene.formulation);
+  scene.settle = table.number("settle", scene.settle);
+  scene.rescale_at_events = table.boolean("rescale_at_events", scene.rescale_at_events);
+  table.reject_unknown();
+}
+
+OrbitScene read_orbit(TableReader table) {
+  OrbitScene orbit;
+  orbit.altitude = table.number("altitude", orbit.altitude);
+  orbit.inclination = table.number("inclination", orbit.inclination);
+  table.reject_unknown();
+  return orbit;
+}
+
+HubScene read_hub(TableReader table, Reading& reading) {
+  HubScene hub;
+  hub.fixed = table.boolean("fixed", hub.fixed);
+  // A hub that does not move needs no mass.
+  hub.mass = table.number("mass", hub.fixed ? std::optional(hub.mass) : std::nullopt);
+  hub.inertia = read_inertia(table, "inertia", hub.fixed ? std::optional(hub.inertia) : std::nullopt, reading);
+  hub.size = table.vector("size", hub.size);
+  table.reject_unknown();
+  return hub;
+}
+
+void read_initial(TableReader table, Scene& scene) {
+  scene.start_rate = table.vector("rate", scene.start_rate);
+  scene.start_velocity = table.vector("velocity", scene.start_velocity);
+  table.reject_unknown();
+}
+
+Scene read_whole_scene(TableReader& table, Reading& reading) {
+  Scene scene;
+  read_format(table, scene_keys::scene_format);
+  scene.name = table.text("name");
+  scene.duration = table.number("duration", scene.duration);
+  scene.output_step = table.number("output_step", scene.output_step);
+  scene.vtu_step = table.number("vtu_step", scene.vtu_step);
+  if (auto accuracy = table.table("accuracy")) read_accuracy(*accuracy, scene);
+  if (auto integrator = table.table("integrator")) read_integrator(*integrator, scene);
+  if (auto orbit = table.table("orbit")) scene.orbit = read_orbit(*orbit);
+  if (auto hub = table.table("hub", true)) scene.hub = read_hub(*hub, reading);
+  if (auto initial = table.table("initial")) read_initial(*initial, scene);
+  for (TableReader& body : table.tables("bodies")) {
+    scene.bodies.push_back(read_body_entry(body, reading));
+    warn_of_rigid(scene.bodies.back(), body.path("modes"), body.has("modes"), reading.warnings);
+  }
+  for (TableReader& hinge : table.tables("hinges")) scene.hinges.push_back(read_hinge(hinge));
+  table.reject_unknown();
+  return scene;
+}
+
+}  // namespace
+
+double OrbitScene::rate() const {
+  constexpr double mu = 3.986004418e14;     // [m^3/s^2], WGS 84
+  constexpr double equatorial = 6378137.0;  // [m], WGS 84
+  const double radius = equatorial + altitude;
+  return std::sqrt(mu / (radius * radius * radius));
+}
+
+Scene parse_scene(const std::string& text, const std::string& file_name, const std::filesystem::path& folder) {
+  const Value root = parse_format(text, file_name, scene_keys::scene_format);
+  Reading reading;
+  reading.folder = folder;
+  TableReader table(root, "", reading.faults);
+  Scene scene = read_whole_scene(table, reading);
+  check_scene(scene, reading.faults);
+  reading.faults.throw_if_any();
+  scene.warnings = std::move(reading.warnings);
+  return scene;
+}
+
+Scene read_scene(const std::filesystem::path& path) {
+  return parse_scene(read_text(path), path.string(), path.parent_path());
+}
+
+BodyScene read_body(const std::filesystem::path& path) {
+  Reading reading;
+  BodyScene body = read_body_file(path, "", reading);
+  check_body(body, "", reading.faults);
+  reading.faults.throw_if_any();
+  return body;
+}
+
+Scene load_scene(const std::string& path_or_name) {
+  if (const char* text = builtin_scene(path_or_name)) return parse_scene(text, path_or_name);
+  std::error_code error;
+  const bool exists = std::filesystem::exists(path_or_name, error);
+  require(exists, fmt::format("{}: there is no such file, and no built-in scene of that name; built-in: \"{}\"",
+                              path_or_name, fmt::join(builtin_scene_names(), "\", \"")));
+  return read_scene(path_or_name);
+}
+
+}  // namespace flexboom

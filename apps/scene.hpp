@@ -1,0 +1,93 @@
+#pragma once
+
+#include "dynamics/hinge.hpp"
+#include "fem/mesh.hpp"
+#include "reduction/reduced_body.hpp"
+
+#include <Eigen/Core>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// A flexible boom as a file describes it (format "flexboom-body-1", or a [[bodies]] entry of a scene).
+struct BodyScene {
+  std::string name;
+  std::string structure = "beam";  // "beam": finite elements; "eq14": closed form (one uniform segment only); "rigid"
+  std::string clamp = "root";      // node set that is fixed
+  int modes = 2;                   // elastic coordinates kept
+  bool modes_auto = false;         // modes = "auto": chosen from the accuracy wanted
+  std::string directions = "hinge-plane";  // modes that count: "hinge-plane" (bending along y) or "all"
+  BeamGeometry geometry;
+  DampingRule damping;             // none by default
+  std::string backend = "arpack";  // eigen-solver
+};
+
+/// A rigid hub. Inertia about its mass centre, which is the origin of its BRF.
+struct HubScene {
+  double mass = 0;                                     // [kg]
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();   // [kg m^2], as given
+  bool fixed = false;                                  // does not move at all
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();      // box for pictures [m]
+};
+
+struct HingeScene {
+  std::string body;  // BodyScene::name; also the hinge's name
+  Hinge hinge;
+  double start_angle = 0;  // [rad]
+  double start_rate = 0;   // [rad/s]
+};
+
+/// Circular orbit of the reference point: for attitude in the local-vertical local-horizontal frame (x along the velocity, z to the Earth).
+struct OrbitScene {
+  double altitude = 405e3;   // above the equatorial radius [m]
+  double inclination = 0;    // [rad]
+  double rate() const;       // mean motion [rad/s]
+};
+
+/// Everything `flexboom run` needs. Defaults are the values a file may leave out.
+struct Scene {
+  std::string name;
+  double duration = 10;        // [s]
+  double output_step = 0.01;   // [s]
+  double vtu_step = 0;         // [s]; 0: no VTU files
+  double tolerance = 1e-6;     // [accuracy] tolerance
+  std::vector<std::string> outputs;  // [accuracy] outputs; empty: all
+  bool error_budget = true;    // [accuracy] budget: repeat the run with a finer everything and print the differences
+  std::string integrator = "bdf";           // [integrator] method
+  std::string formulation = "relative";     // [integrator] formulation
+  double settle = -1;          // [integrator] settle, IntegratorOptions::settle
+  bool rescale_at_events = false;
+  HubScene hub;
+  Eigen::Vector3d start_rate = Eigen::Vector3d::Zero();      // [initial] hub angular velocity, hub axes [rad/s]
+  Eigen::Vector3d start_velocity = Eigen::Vector3d::Zero();  // [initial] hub velocity [m/s]
+  std::optional<OrbitScene> orbit;
+  std::vector<BodyScene> bodies;
+  std::vector<HingeScene> hinges;
+  std::vector<std::string> warnings;  // what was repaired or is odd (e.g. an inertia that is not symmetric)
+};
+
+
+/// Reads and checks everything; unknown keys are errors that name the nearest known key.
+/// @throws InputError with every fault found, one per line.
+Scene read_scene(const std::filesystem::path&);
+Scene parse_scene(const std::string& text, const std::string& file_name, const std::filesystem::path& folder = ".");
+BodyScene read_body(const std::filesystem::path&);
+
+/// A path, or the name of a built-in scene ("sport"). @throws InputError listing the built-in names.
+Scene load_scene(const std::string& path_or_name);
+
+/// Text of a built-in scene, nullptr if there is none of that name. The text is the commented file in meshes/.
+const char* builtin_scene(const std::string& name);
+std::vector<std::string> builtin_scene_names();
+
+/// The scene as TOML with every default written out; parse_scene reads it back to the same Scene.
+std::string to_toml(const Scene&);
+
+/// Checks that reading can not do line by line (also after command-line overrides). @throws InputError.
+void validate(const Scene&);
+
+}  // namespace flexboom

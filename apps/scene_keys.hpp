@@ -1,0 +1,72 @@
+#pragma once
+
+#include "apps/toml_reader.hpp"
+#include "fem/section.hpp"
+
+#include <array>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+/// What the reader, the checks and the writer of scenes share: every name that a file may use is spelled here once.
+/// Internal to `apps`.
+namespace flexboom::scene_keys {
+
+inline constexpr std::string_view scene_format = "flexboom-scene-1";
+inline constexpr std::string_view body_format = "flexboom-body-1";
+inline constexpr std::array<std::string_view, 3> structures = {"beam", "eq14", "rigid"};
+inline constexpr std::array<std::string_view, 2> directions = {"hinge-plane", "all"};
+inline constexpr std::array<std::string_view, 2> theories = {"euler-bernoulli", "timoshenko"};  // order of BeamTheory
+inline constexpr std::array<std::string_view, 2> shear_rules = {"cowper", "nu-squared"};        // or a number
+inline constexpr std::array<std::string_view, 4> damping_rules = {"none", "modal", "loss-factor", "rayleigh"};
+
+/// A dimension of a cross-section [m, m^2, m^4, -].
+struct Dimension {
+  std::string_view key;
+  double* value;
+  bool optional = false;
+};
+
+inline std::vector<Dimension> dimensions(RoundBar& s) { return {{"diameter", &s.diameter}}; }
+inline std::vector<Dimension> dimensions(Tube& s) { return {{"diameter", &s.diameter}, {"thickness", &s.thickness}}; }
+inline std::vector<Dimension> dimensions(Rectangle& s) { return {{"height", &s.height}, {"width", &s.width}}; }
+inline std::vector<Dimension> dimensions(RectangularTube& s) {
+  return {{"height", &s.height}, {"width", &s.width}, {"thickness", &s.thickness}};
+}
+inline std::vector<Dimension> dimensions(GeneralSection& s) {
+  return {{"A", &s.A},
+          {"Iy", &s.Iy},
+          {"Iz", &s.Iz},
+          {"J", &s.J},
+          {"kappa_y", &s.kappa_y, true},
+          {"kappa_z", &s.kappa_z, true}};
+}
+inline std::vector<Dimension> dimensions(SectionShape& shape) {
+  return std::visit([](auto& s) { return dimensions(s); }, shape);
+}
+
+/// Names in the order of the alternatives of SectionShape.
+inline constexpr std::array<std::string_view, 5> shapes = {"round-bar", "tube", "rectangle", "rectangular-tube",
+                                                           "general"};
+static_assert(shapes.size() == std::variant_size_v<SectionShape>);
+
+inline SectionShape blank_shape(size_t index) {
+  const std::array<SectionShape, 5> blank = {RoundBar{}, Tube{}, Rectangle{}, RectangularTube{}, GeneralSection{}};
+  return blank[index];
+}
+
+}  // namespace flexboom::scene_keys
+
+namespace flexboom {
+
+struct Scene;
+struct BodyScene;
+
+/// Everything that can be said of the values themselves, under the key paths of a scene file or (for a body with an
+/// empty path) of a body file.
+void check_scene(const Scene&, toml_reader::Faults&);
+void check_body(const BodyScene&, const std::string& path, toml_reader::Faults&);
+
+}  // namespace flexboom

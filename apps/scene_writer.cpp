@@ -1,0 +1,160 @@
+#include "apps/scene.hpp"
+#include "apps/scene_keys.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <type_traits>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using scene_keys::Dimension;
+
+// The shortest decimal that reads back to the same double, always recognisable as a float.
+std::string toml(double value) {
+  std::string text = fmt::format("{}", value);
+  if (text.find_first_of(".ein") == std::string::npos) text += ".0";
+  return text;
+}
+std::string toml(bool value) { return value ? "true" : "false"; }
+std::string toml(int value) { return fmt::format("{}", value); }
+std::string toml(const std::string& value) { return toml_reader::quoted(value); }
+std::string toml(std::string_view value) { return toml_reader::quoted(value); }
+std::string toml(const Vector3d& v) { return fmt::format("[{}, {}, {}]", toml(v.x()), toml(v.y()), toml(v.z())); }
+std::string toml(const Matrix3d& m) {
+  const auto row = [&m](int i) { return toml(Vector3d(m.row(i))); };
+  return fmt::format("[\n  {},\n  {},\n  {},\n]", row(0), row(1), row(2));
+}
+std::string toml(const std::vector<std::string>& values) {
+  std::string text = "[";
+  for (const std::string& value : values) text += (text.size() > 1 ? ", " : "") + toml(value);
+  return text + "]";
+}
+
+class Writer {
+ public:
+  void table(const char* header) { text_ += fmt::format("\n{}\n", header); }
+
+  template <class T>
+  void key(std::string_view name, const T& value, const char* comment = "") {
+    text_ += fmt::format("{} = {}{}{}\n", name, toml(value), *comment ? "  # " : "", comment);
+  }
+
+  void raw(std::string_view name, const std::string& value) { text_ += fmt::format("{} = {}\n", name, value); }
+
+  std::string text() && { return std::move(text_); }
+
+ private:
+  std::string text_;
+};
+
+std::string inline_dimensions(SectionShape shape) {
+  std::string text;
+  for (const Dimension& d : scene_keys::dimensions(shape)) {
+    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", d.key, toml(*d.value));
+  }
+  return "{ " + text + " }";
+}
+
+void write_segment(Writer& out, BeamSegment segment) {
+  out.table("[[bodies.segments]]");
+  out.key("shape", scene_keys::shapes[segment.start.index()]);
+  for (const Dimension& d : scene_keys::dimensions(segment.start)) out.key(d.key, *d.value);
+  out.raw("end", inline_dimensions(segment.end));
+  out.key("length", segment.length, "m");
+  out.key("elements", segment.elements, segment.elements == 0 ? "chosen by the program" : "");
+  const Material& material = segment.material;
+  out.raw("material",
+          fmt::format("{{ E = {}, nu = {}, rho = {} }}", toml(material.E), toml(material.nu), toml(material.rho)));
+}
+
+void write_attachment(Writer& out, const RigidAttachment& attachment) {
+  out.table("[[bodies.attachments]]");
+  out.key("name", attachment.name);
+  out.key("position", attachment.position, "m from the root");
+  out.key("mass", attachment.mass, "kg");
+  out.key("inertia", attachment.inertia, "kg m^2, about its mass centre");
+  out.key("offset", attachment.offset, "m");
+}
+
+void write_body(Writer& out, const BodyScene& body) {
+  const BeamGeometry& boom = body.geometry;
+  out.table("[[bodies]]");
+  out.key("name", body.name);
+  out.key("structure", body.structure);
+  out.key("clamp", body.clamp);
+  out.raw("modes", body.modes_auto ? "\"auto\"" : toml(body.modes));
+  out.key("directions", body.directions);
+  out.key("theory", scene_keys::theories[static_cast<size_t>(boom.theory)]);
+  out.raw("shear", boom.shear.name == "value" ? toml(boom.shear.value) : toml(boom.shear.name));
+  out.key("rotary_inertia", boom.rotary_inertia);
+  out.key("order", boom.order);
+  out.key("backend", body.backend);
+  const DampingRule& damping = body.damping;
+  out.raw("damping", fmt::format("{{ rule = {}, value = {}, alpha = {}, beta = {} }}", toml(damping.name),
+                                 toml(damping.value), toml(damping.alpha), toml(damping.beta)));
+  for (const BeamSegment& segment : boom.segments) write_segment(out, segment);
+  for (const RigidAttachment& attachment : boom.attachments) write_attachment(out, attachment);
+}
+
+void write_hinge(Writer& out, const HingeScene& scene) {
+  const Hinge& hinge = scene.hinge;
+  const HingeMechanism& mechanism = hinge.mechanism;
+  out.table("[[hinges]]");
+  out.key("body", scene.body);
+  out.key("point", hinge.point, "m, hub axes");
+  out.key("stowed", hinge.stowed);
+  out.key("outward", hinge.outward);
+  out.key("stiffness", mechanism.stiffness, "N m/rad, P1 / threshold");
+  out.key("rest", mechanism.rest, "rad");
+  out.key("P2", mechanism.damping, "N m s/rad");
+  out.key("P3", mechanism.stop_stiffness, "N m/rad");
+  out.key("threshold", mechanism.threshold, "rad");
+  out.key("start_angle", scene.start_angle, "rad");
+  out.key("start_rate", scene.start_rate, "rad/s");
+}
+
+void write_settings(Writer& out, const Scene& scene) {
+  out.key("format", scene_keys::scene_format);
+  out.key("name", scene.name);
+  out.key("duration", scene.duration, "s");
+  out.key("output_step", scene.output_step, "s");
+  out.key("vtu_step", scene.vtu_step, "s; 0: no VTU files");
+  out.table("[accuracy]");
+  out.key("tolerance", scene.tolerance);
+  out.key("outputs", scene.outputs, scene.outputs.empty() ? "all" : "");
+  out.key("budget", scene.error_budget);
+  out.table("[integrator]");
+  out.key("method", scene.integrator);
+  out.key("formulation", scene.formulation);
+  out.key("settle", scene.settle);
+  out.key("rescale_at_events", scene.rescale_at_events);
+}
+
+}  // namespace
+
+std::string to_toml(const Scene& scene) {
+  Writer out;
+  write_settings(out, scene);
+  if (scene.orbit) {
+    out.table("[orbit]");
+    out.key("altitude", scene.orbit->altitude, "m");
+    out.key("inclination", scene.orbit->inclination, "rad");
+  }
+  out.table("[hub]");
+  out.key("mass", scene.hub.mass, "kg");
+  out.key("inertia", scene.hub.inertia, "kg m^2");
+  out.key("fixed", scene.hub.fixed);
+  out.key("size", scene.hub.size, "m");
+  out.table("[initial]");
+  out.key("rate", scene.start_rate, "rad/s");
+  out.key("velocity", scene.start_velocity, "m/s");
+  for (const BodyScene& body : scene.bodies) write_body(out, body);
+  for (const HingeScene& hinge : scene.hinges) write_hinge(out, hinge);
+  return std::move(out).text();
+}
+
+}  // namespace flexboom

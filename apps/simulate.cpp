@@ -1,0 +1,389 @@
+#include "apps/simulate.hpp"
+
+#include "dynamics/rotation.hpp"
+#include "fem/check.hpp"
+#include "reduction/eq14.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+PreparedBody prepare_eq14(const BodyScene& b) {
+  const BeamSegment& segment = b.geometry.segments.at(0);
+  const Section s = section_of(segment.start, segment.material.nu, b.geometry.shear);
+  const eq14::Boom boom{segment.length, segment.material.rho * s.A, segment.material.E * s.Iz};
+  const bool all = b.directions == "all";
+  require(!all || b.modes % 2 == 0,
+          fmt::format("body {}: eq. 14 has equal modes in two planes: with directions = \"all\" give an even number of modes, not {}",
+                      b.name, b.modes));
+  const int per_plane = all ? b.modes / 2 : b.modes;
+  PreparedBody r;
+  r.body = eq14::reduced_body(boom, per_plane, all ? eq14::Planes::xy_and_xz : eq14::Planes::xy, b.name);
+  return r;
+}
+
+PreparedBody prepare_beam(const BodyScene& b, int refine) {
+  BeamGeometry geometry = b.geometry;
+  geometry.order += refine;
+  const Mesh mesh = make_mesh(geometry);
+  const Assembly assembly = assemble(mesh);
+  const std::vector<int>& clamp = node_set(mesh, b.clamp);
+  PreparedBody r;
+  ModalBasis basis;
+  basis.Phi = MatrixXd::Zero(assembly.dofs.count, 0);
+  basis.omega = VectorXd::Zero(0);
+  if (b.structure != "rigid" && b.modes > 0) {
+    EigenOptions options;
+    options.backend = b.backend;
+    options.num_modes = b.modes;
+    const std::vector<ModeKind> kinds = b.directions == "all" ? std::vector<ModeKind>{} : std::vector{ModeKind::bending_y};
+    basis = clamped_modes_of_kind(mesh, assembly, clamp, b.modes, kinds, options);
+  }
+  r.body = reduce(mesh, assembly, basis, b.name);
+  r.checks = check_invariants(r.body, mesh, assembly, basis);
+  r.eigen = basis.summary;
+  r.elements = static_cast<int>(mesh.elements.size());
+  r.dofs = static_cast<int>(free_dofs(assembly.dofs, clamp).size());
+  if (b.structure == "rigid") r.body.structure = "rigid";
+  return r;
+}
+
+}  // namespace
+
+PreparedBody prepare_body(const BodyScene& b, int refine) {
+  require(b.structure == "eq14" || b.structure == "beam" || b.structure == "rigid",
+          fmt::format("body {}: structure '{}' is not available; there are: 'beam', 'eq14', 'rigid'", b.name, b.structure));
+  PreparedBody r = b.structure == "eq14" ? prepare_eq14(b) : prepare_beam(b, refine);
+  apply_damping(r.body, b.damping);
+  for (const InvariantCheck& c : r.checks)
+    if (!c.passed)
+      throw NumericalError(fmt::format("body {}: invariant {} = {:.17g}, but {:.17g} by an independent route", b.name, c.name,
+                                       c.value, c.reference));
+  return r;
+}
+
+Flyable make_system(const Scene& scene, const std::vector<PreparedBody>& bodies) {
+  const Matrix3d I = 0.5 * (scene.hub.inertia + scene.hub.inertia.transpose());
+  ReducedBody hub = rigid_body("hub", scene.hub.mass, Vector3d::Zero(), I);
+  std::vector<Appendage> appendages;
+  std::vector<double> angles;
+  for (const PreparedBody& p : bodies) {
+    const auto h = std::find_if(scene.hinges.begin(), scene.hinges.end(),
+                                [&](const HingeScene& s) { return s.body == p.body.name; });
+    require(h != scene.hinges.end(), fmt::format("body {} has no hinge", p.body.name));
+    appendages.push_back({p.body, h->hinge});
+    appendages.back().hinge.name = p.body.name;
+    angles.push_back(h->start_angle);
+  }
+  System system(std::move(hub), std::move(appendages), scene.hub.fixed);
+  State start = system.at_rest(angles);
+  start.omega = scene.start_rate;
+  start.velocity = scene.start_velocity;
+  for (size_t i = 0; i < bodies.size(); ++i)
+    for (const HingeScene& h : scene.hinges)
+      if (h.body == bodies[i].body.name) start.rate[i] = h.start_rate;
+  VectorXd y0 = system.pack(start);
+  return {std::move(system), std::move(y0)};
+}
+
+namespace {
+
+/// Roll, pitch, yaw (3-2-1: yaw about z, then pitch about y, then roll about x) of the hub against the local-vertical local-horizontal frame: x along
+/// the velocity, y against the orbit normal, z to the Earth. At t = 0 the start attitude is aligned with it; it turns at -n about its y.
+Vector3d lvlh_angles(const Vector3d& rotation, double n, double t) {
+  const double angle = rotation.norm();
+  const Matrix3d A = angle > 0 ? Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix() : Matrix3d::Identity();
+  const Matrix3d frame = Eigen::AngleAxisd(-n * t, Vector3d::UnitY()).toRotationMatrix();
+  const Matrix3d C = frame.transpose() * A;  // hub -> LVLH
+  return {std::atan2(C(2, 1), C(2, 2)), std::asin(std::clamp(-C(2, 0), -1.0, 1.0)), std::atan2(C(1, 0), C(0, 0))};
+}
+
+void add_vector(std::vector<std::string>& names, const std::string& stem) {
+  for (const char* axis : {".x", ".y", ".z"}) names.push_back(stem + axis);
+}
+
+std::vector<std::string> output_names(const Scene& scene, const System& system) {
+  std::vector<std::string> names = {"t"};
+  for (const char* stem : {"hub.rotation", "hub.rate", "hub.position"}) add_vector(names, stem);
+  if (scene.orbit)
+    for (const char* name : {"lvlh.roll", "lvlh.pitch", "lvlh.yaw"}) names.emplace_back(name);
+  for (const Appendage& a : system.appendages()) {
+    const std::string& name = a.body.name;
+    names.push_back(name + ".angle");
+    names.push_back(name + ".rate");
+    for (int k = 1; k <= a.body.n(); ++k) names.push_back(fmt::format("{}.q{}", name, k));
+    add_vector(names, name + ".tip");
+  }
+  for (const char* name : {"energy.kinetic", "energy.elastic", "energy.dissipated"}) names.emplace_back(name);
+  return names;
+}
+
+}  // namespace
+
+OutputTable output_table(const Scene& scene, const System& system, const Trajectory& motion) {
+  OutputTable table{output_names(scene, system), {}};
+  const auto rows = static_cast<Eigen::Index>(motion.time.size());
+  table.values.resize(rows, static_cast<Eigen::Index>(table.names.size()));
+  const State start = system.unpack(motion.y.front());
+  Eigen::Vector4d back = start.attitude;
+  back.tail<3>() *= -1;
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    const auto i = static_cast<size_t>(row);
+    const State s = system.unpack(motion.y[i]);
+    Eigen::Index column = 0;
+    const auto put = [&](double value) { table.values(row, column++) = value; };
+    const auto put_vector = [&](const Vector3d& v) { put(v.x()), put(v.y()), put(v.z()); };
+    const Vector3d rotation = rotation_vector(quaternion_product(back, s.attitude));
+    put(motion.time[i]);
+    put_vector(rotation);
+    put_vector(s.omega);
+    put_vector(s.position - start.position);
+    if (scene.orbit) put_vector(lvlh_angles(rotation, scene.orbit->rate(), motion.time[i]));
+    for (size_t b = 0; b < system.appendages().size(); ++b) {
+      put(s.angle[b]);
+      put(s.rate[b]);
+      for (const double q : s.q[b]) put(q);
+      put_vector(system.tip_displacement(s, static_cast<int>(b)));
+    }
+    put(motion.balance[i].kinetic);
+    put(motion.balance[i].elastic);
+    put(s.dissipated);
+  }
+  return table;
+}
+
+namespace {
+
+/// "sip.q2" -> "sip.q", "hub.rotation.x" -> "hub.rotation", "sip.angle" -> "sip.angle".
+std::string output_of_column(const std::string& column) {
+  const auto dot = column.rfind('.');
+  if (dot == std::string::npos) return column;
+  const std::string last = column.substr(dot + 1);
+  if (last == "x" || last == "y" || last == "z") return column.substr(0, dot);
+  if (last.size() > 1 && last[0] == 'q' && std::isdigit(static_cast<unsigned char>(last[1]))) return column.substr(0, dot) + ".q";
+  return column;
+}
+
+bool is_wanted(const std::string& output, const std::vector<std::string>& wanted) {
+  if (output == "t" || output.starts_with("energy.") || output.starts_with("lvlh.")) return false;
+  return wanted.empty() || std::find(wanted.begin(), wanted.end(), output) != wanted.end();
+}
+
+}  // namespace
+
+std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b, const std::vector<std::string>& wanted) {
+  const Eigen::Index rows = std::min(a.values.rows(), b.values.rows());
+  std::vector<std::string> order;
+  std::map<std::string, std::vector<std::pair<Eigen::Index, Eigen::Index>>> columns;
+  for (size_t i = 0; i < a.names.size(); ++i) {
+    const auto j = std::find(b.names.begin(), b.names.end(), a.names[i]);
+    const std::string output = output_of_column(a.names[i]);
+    if (j == b.names.end() || !is_wanted(output, wanted)) continue;
+    if (!columns.contains(output)) order.push_back(output);
+    columns[output].emplace_back(static_cast<Eigen::Index>(i), j - b.names.begin());
+  }
+  std::vector<OutputDifference> result;
+  for (const std::string& output : order) {
+    double difference = 0, size = 0;
+    for (Eigen::Index row = 0; row < rows; ++row) {
+      double d = 0, s = 0;
+      for (const auto& [i, j] : columns[output]) {
+        d += std::pow(a.values(row, i) - b.values(row, j), 2);
+        s += std::pow(b.values(row, j), 2);
+      }
+      difference = std::max(difference, std::sqrt(d));
+      size = std::max(size, std::sqrt(s));
+    }
+    result.push_back({output, size > 0 ? difference / size : difference});
+  }
+  return result;
+}
+
+namespace {
+
+double largest(const std::vector<OutputDifference>& differences) {
+  double r = 0;
+  for (const OutputDifference& d : differences) r = std::max(r, d.error);
+  return r;
+}
+
+IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks) {
+  IntegratorOptions o;
+  o.method = scene.integrator;
+  o.tolerance = scene.tolerance;
+  o.duration = scene.duration;
+  o.output_step = scene.output_step;
+  o.settle = scene.settle;
+  o.rescale_at_events = scene.rescale_at_events;
+  o.interrupt = hooks.interrupt;
+  o.progress = hooks.progress;
+  return o;
+}
+
+struct Run {
+  std::vector<PreparedBody> bodies;
+  Trajectory motion;
+  OutputTable outputs;
+  double prepare_seconds = 0, integrate_seconds = 0;
+};
+
+Run run_once(const Scene& scene, int refine, const RunHooks& hooks) {
+  const auto start = std::chrono::steady_clock::now();
+  Run r;
+  for (const BodyScene& b : scene.bodies) r.bodies.push_back(prepare_body(b, refine));
+  const Flyable f = make_system(scene, r.bodies);
+  r.prepare_seconds = seconds_since(start);
+  const auto flight = std::chrono::steady_clock::now();
+  r.motion = integrate(f.system, f.y0, integrator_options(scene, hooks));
+  r.integrate_seconds = seconds_since(flight);
+  r.outputs = output_table(scene, f.system, r.motion);
+  return r;
+}
+
+/// Geometric stiffness of spin is left out of Ke: its size against it, (Omega / omega_1)^2 of the body's first mode, at worst over the run.
+double linearisation_estimate(const Run& run) {
+  double worst = 0;
+  for (size_t b = 0; b < run.bodies.size(); ++b) {
+    const ReducedBody& body = run.bodies[b].body;
+    if (body.n() == 0) continue;
+    const double omega_1 = std::sqrt(body.Ke(0, 0) / body.Me(0, 0));
+    double spin = 0;
+    const auto rate = std::find(run.outputs.names.begin(), run.outputs.names.end(), body.name + ".rate") - run.outputs.names.begin();
+    for (Eigen::Index row = 0; row < run.outputs.values.rows(); ++row) {
+      const double w = run.outputs.values.row(row).segment<3>(4).norm() + std::abs(run.outputs.values(row, rate));
+      spin = std::max(spin, w);
+    }
+    worst = std::max(worst, spin * spin / (omega_1 * omega_1));
+  }
+  return worst;
+}
+
+bool any_elastic(const Scene& scene, const char* structure) {
+  return std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const BodyScene& b) {
+    return b.modes > 0 && b.structure != "rigid" && (structure == nullptr || b.structure == structure);
+  });
+}
+
+Scene with_more_modes(Scene scene, int extra) {
+  for (BodyScene& b : scene.bodies)
+    if (b.structure != "rigid" && b.modes > 0) b.modes += extra;
+  return scene;
+}
+
+/// Repeats the run ten times tighter until the difference is within the tolerance; the tighter run then takes its place. Returns the difference.
+/// `flown` is the scene of the run that was kept.
+double settle_time_error(const Scene& scene, Scene& flown, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
+  constexpr int most = 3;
+  for (int i = 1;; ++i) {
+    Scene tight = flown;
+    tight.tolerance /= 10;
+    Run finer = run_once(tight, 0, hooks);
+    const double error = largest(compare_outputs(run.outputs, finer.outputs, scene.outputs));
+    if (error <= scene.tolerance || i == most || finer.motion.summary.interrupted || tight.tolerance < 1e-13) return error;
+    run = std::move(finer);
+    flown = tight;
+    plan.push_back(fmt::format("time integration: changed by {:.1e} at a tenth of the tolerance, so that run is the one kept (integrator "
+                               "tolerance {:.0e})", error, tight.tolerance));
+  }
+}
+
+/// Repeats the run with a tighter tolerance, more modes, a finer mesh.
+ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
+  ErrorBudget budget;
+  Scene flown = scene;
+  budget.time = settle_time_error(scene, flown, run, hooks, plan);
+  const auto change = [&](const Scene& other, int refine) {
+    return largest(compare_outputs(run.outputs, run_once(other, refine, hooks).outputs, scene.outputs));
+  };
+  if (any_elastic(scene, nullptr)) budget.truncation = change(with_more_modes(flown, 2), 0);
+  if (any_elastic(scene, "beam")) budget.discretisation = change(flown, 2);
+  budget.linearisation = linearisation_estimate(run);
+  budget.measured = hooks.interrupt == nullptr || !hooks.interrupt->load();
+  return budget;
+}
+
+/// Raises the number of modes until two more change the wanted outputs by less than the tolerance.
+void choose_modes(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
+  constexpr int most = 8;
+  std::vector<size_t> automatic;
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].modes_auto && scene.bodies[i].structure != "rigid") automatic.push_back(i);
+  if (automatic.empty()) return;
+  for (int n = 1;; ++n) {
+    Scene more = scene;
+    for (const size_t i : automatic) scene.bodies[i].modes = n, more.bodies[i].modes = n + 2;
+    const double error = largest(compare_outputs(run_once(scene, 0, hooks).outputs, run_once(more, 0, hooks).outputs, scene.outputs));
+    if (error <= scene.tolerance || n == most) {
+      plan.push_back(fmt::format("modes: {} per automatic body: two more change the outputs by {:.2e} ({} the tolerance {:.1e})", n,
+                                 error, error <= scene.tolerance ? "within" : "still above", scene.tolerance));
+      return;
+    }
+  }
+}
+
+void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan) {
+  for (size_t i = 0; i < run.bodies.size(); ++i) {
+    const BodyScene& b = scene.bodies[i];
+    const PreparedBody& p = run.bodies[i];
+    std::string model = p.body.structure == "eq14" ? "eq. 14, Euler-Bernoulli line mass, closed form"
+                                                   : fmt::format("{} beam elements, order {}, {} unknowns", p.elements,
+                                                                 b.geometry.order, p.dofs);
+    plan.push_back(fmt::format("{}: {}; {} modes", b.name, model, p.body.n()));
+    plan.push_back(b.damping.name == "none" ? fmt::format("{}: no structural damping", b.name)
+                                            : fmt::format("{}: structural damping '{}', value {:g}", b.name, b.damping.name,
+                                                          b.damping.value));
+  }
+  for (const HingeScene& h : scene.hinges)
+    plan.push_back(fmt::format("hinge {}: damping {:g} N m s/rad, stop {:g} N m/rad without damping of its own", h.body,
+                               h.hinge.mechanism.damping, h.hinge.mechanism.stop_stiffness));
+  plan.push_back(fmt::format("integrator: {}, tolerance {:.1e}; damping of the method itself shows in energy_balance", scene.integrator,
+                             scene.tolerance));
+  plan.emplace_back("geometric stiffness: left out, its size is error_budget.linearisation");
+  if (scene.orbit)
+    plan.push_back(fmt::format("orbit: sets the LVLH frame (rate {:.6e} rad/s); gravity gradient left out, {:.1e} 1/s^2", scene.orbit->rate(),
+                               3 * std::pow(scene.orbit->rate(), 2)));
+}
+
+}  // namespace
+
+RunResult run_scene(const Scene& given, const RunHooks& hooks) {
+  RunResult r;
+  r.scene = given;
+  validate(r.scene);
+  RunHooks silent = hooks;
+  silent.progress = nullptr;
+  choose_modes(r.scene, silent, r.plan);
+  Run run = run_once(r.scene, 0, hooks);
+  describe(r.scene, run, r.plan);
+  r.warnings = r.scene.warnings;
+  if (r.scene.error_budget && !run.motion.summary.interrupted) {
+    const auto start = std::chrono::steady_clock::now();
+    r.budget = measure_budget(r.scene, run, silent, r.plan);
+    r.budget_seconds = seconds_since(start);
+  }
+  r.bodies = std::move(run.bodies);
+  r.trajectory = std::move(run.motion);
+  r.outputs = std::move(run.outputs);
+  r.prepare_seconds = run.prepare_seconds;
+  r.integrate_seconds = run.integrate_seconds;
+  return r;
+}
+
+}  // namespace flexboom

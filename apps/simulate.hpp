@@ -1,0 +1,82 @@
+#pragma once
+
+#include "apps/scene.hpp"
+#include "dynamics/integrator.hpp"
+#include "reduction/inertia_invariants.hpp"
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// A body of a scene made ready to fly, with what is known of its quality.
+struct PreparedBody {
+  ReducedBody body;
+  int elements = 0;
+  int dofs = 0;                        // unknowns of the model, 0 in closed form
+  std::vector<InvariantCheck> checks;  // empty in closed form
+  EigenSummary eigen;
+};
+
+/// Geometry -> mesh -> K, M -> modes -> reduced body, or the closed form, as the scene says.
+/// `refine` raises the polynomial order, for error estimates. @throws InputError, NumericalError.
+PreparedBody prepare_body(const BodyScene&, int refine = 0);
+
+/// Four separate errors of a run, each relative to the outputs wanted (README of apps: what each is compared with).
+struct ErrorBudget {
+  double discretisation = 0;
+  double truncation = 0;
+  double time = 0;
+  double linearisation = 0;
+  bool measured = false;  // false: the repeats were not run
+  double total() const { return discretisation + truncation + time + linearisation; }
+};
+
+/// Names and values of the outputs of a run, one row per time: the columns of trajectory.csv.
+struct OutputTable {
+  std::vector<std::string> names;
+  Eigen::MatrixXd values;  // rows: times
+};
+
+struct RunResult {
+  Scene scene;
+  std::vector<PreparedBody> bodies;
+  Trajectory trajectory;
+  OutputTable outputs;
+  ErrorBudget budget;
+  std::vector<std::string> plan;      // what was chosen and why, one line each
+  std::vector<std::string> warnings;
+  double prepare_seconds = 0;
+  double integrate_seconds = 0;       // of the run itself, without the repeats
+  double budget_seconds = 0;
+};
+
+/// The system of a scene and its start state.
+struct Flyable {
+  System system;
+  Eigen::VectorXd y0;
+};
+Flyable make_system(const Scene&, const std::vector<PreparedBody>&);
+
+struct RunHooks {
+  const std::atomic<bool>* interrupt = nullptr;
+  std::function<void(double time, double duration)> progress;
+};
+
+/// The whole chain. @throws InputError, NumericalError.
+RunResult run_scene(const Scene&, const RunHooks&);
+
+/// Columns of trajectory.csv.
+OutputTable output_table(const Scene&, const System&, const Trajectory&);
+
+/// Largest relative difference over the wanted outputs that both tables have (all when `wanted` is empty): for each output, a vector
+/// counting as one, max over time of |a - b| over max |b|.
+struct OutputDifference {
+  std::string name;
+  double error = 0;
+};
+std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b, const std::vector<std::string>& wanted);
+
+}  // namespace flexboom

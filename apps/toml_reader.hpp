@@ -1,0 +1,135 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+/// Reading TOML so that every fault is found in one go and says where it is. The parser itself is behind
+/// toml_reader.cpp.
+namespace flexboom::toml_reader {
+
+/// A place in a file, counted from 1; line 0: unknown.
+struct Place {
+  std::string file;
+  int line = 0;
+  int column = 0;
+};
+
+/// A parsed value. Tables keep the order of the file.
+struct Value {
+  enum class Kind { boolean, integer, number, text, date, array, table };
+  Kind kind = Kind::table;
+  Place place;  // of its key, or of itself inside an array
+  bool boolean = false;
+  std::int64_t integer = 0;
+  double number = 0;  // also set for an integer
+  std::string text;
+  std::vector<Value> items;                            // of an array
+  std::vector<std::pair<std::string, Value>> entries;  // of a table
+};
+
+/// @throws InputError `file:line:column: what is wrong` for text that is not TOML or not UTF-8.
+Value parse(const std::string& text, const std::string& file);
+
+/// Collects faults under key paths such as "bodies[1].segments[0].length". Only the first fault of a key is kept, and
+/// none below a key that is faulty itself: what follows from a fault is noise.
+class Faults {
+ public:
+  /// Remembers where a key path stands; the last call wins.
+  void locate(const std::string& path, const Place&);
+
+  /// A fault at the place of its path, or of the nearest path above that has a place.
+  void add(const std::string& path, const std::string& text);
+  void add(const std::string& path, const Place&, const std::string& text);
+
+  /// Whether nothing was found at this path, above it or below it.
+  bool clean(const std::string& path) const;
+  bool empty() const { return faults_.empty(); }
+
+  /// @throws InputError with one line per fault, in the order of the file.
+  void throw_if_any() const;
+
+ private:
+  struct Fault {
+    Place place;
+    std::string path, text;
+  };
+  Place place_of(std::string path) const;
+
+  std::map<std::string, Place> places_;
+  std::vector<Fault> faults_;
+};
+
+/// Hands out the values of one table and takes note of the keys it was asked for. A value that is missing or of the
+/// wrong type is a fault, and the answer is then NaN, 0, false or empty. A default makes a key optional. Ranges are not
+/// looked at here.
+class TableReader {
+ public:
+  TableReader(const Value& table, std::string path, Faults&);
+
+  bool has(std::string_view key);
+  double number(std::string_view key, std::optional<double> otherwise = {});
+  int integer(std::string_view key, std::optional<int> otherwise = {});
+  bool boolean(std::string_view key, std::optional<bool> otherwise = {});
+  std::string text(std::string_view key, const std::optional<std::string>& otherwise = {});
+  std::vector<std::string> texts(std::string_view key, const std::vector<std::string>& otherwise);
+  Eigen::Vector3d vector(std::string_view key, const std::optional<Eigen::Vector3d>& otherwise = {});
+
+  /// Three rows of three, or the three diagonal values.
+  Eigen::Matrix3d matrix(std::string_view key, const std::optional<Eigen::Matrix3d>& otherwise = {});
+
+  /// Whether the key holds a text rather than something else (for keys that take either).
+  bool is_text(std::string_view key);
+
+  /// Index of a text among names.
+  size_t choice(std::string_view key, std::span<const std::string_view> names, size_t otherwise);
+
+  /// A table below; absent and not required: nothing.
+  std::optional<TableReader> table(std::string_view key, bool required = false);
+
+  /// The tables of an array of tables; absent: empty.
+  std::vector<TableReader> tables(std::string_view key);
+
+  /// Makes every key that was not asked for a fault, and names the nearest one that was. `hint` is put behind it.
+  void reject_unknown(const std::string& hint = "");
+
+  /// Adds a fault at a key of this table.
+  void fault(std::string_view key, const std::string& text);
+
+  std::string path(std::string_view key) const;
+  const std::string& path() const { return path_; }
+  const Value& value() const { return *table_; }
+
+  /// Place of a key that is there, of the table otherwise.
+  Place place(std::string_view key);
+
+ private:
+  const Value* find(std::string_view key);
+  /// The value of a key if it is there and of that kind; faults otherwise.
+  const Value* find(std::string_view key, Value::Kind, bool required);
+  bool numbers(const Value& array, std::string_view key, double* out);
+
+  const Value* table_;
+  std::string path_;
+  Faults* faults_;
+  std::vector<std::string> known_;
+};
+
+/// `is "X"; it must be "a", "b" or "c"`, with the nearest name first asked for where one is near.
+std::string not_among(const std::string& value, std::span<const std::string_view> names);
+
+/// The name that differs by the fewest edits, empty if none is near.
+std::string nearest(std::string_view value, std::span<const std::string_view> names);
+
+/// A TOML basic string with its quotes; control characters are escaped, so it is also fit for messages.
+std::string quoted(std::string_view text);
+
+}  // namespace flexboom::toml_reader
