@@ -80,8 +80,8 @@ PreparedBody prepare_body(const BodyScene& b, int refine) {
 }
 
 Flyable make_system(const Scene& scene, const std::vector<PreparedBody>& bodies) {
-  const Matrix3d I = 0.5 * (scene.hub.inertia + scene.hub.inertia.transpose());
-  ReducedBody hub = rigid_body("hub", scene.hub.mass, Vector3d::Zero(), I);
+  // A hub that does not move needs no mass.
+  ReducedBody hub = scene.hub.fixed ? ReducedBody{} : rigid_body("hub", scene.hub.mass, Vector3d::Zero(), scene.hub.inertia);
   std::vector<Appendage> appendages;
   std::vector<double> angles;
   for (const PreparedBody& p : bodies) {
@@ -331,6 +331,7 @@ void choose_modes(Scene& scene, const RunHooks& hooks, std::vector<std::string>&
     for (const size_t i : automatic) scene.bodies[i].modes = n, more.bodies[i].modes = n + 2;
     const double error = largest(compare_outputs(run_once(scene, 0, hooks).outputs, run_once(more, 0, hooks).outputs, scene.outputs));
     if (error <= scene.tolerance || n == most) {
+      for (const size_t i : automatic) scene.bodies[i].modes_auto = false;
       plan.push_back(fmt::format("modes: {} per automatic body: two more change the outputs by {:.2e} ({} the tolerance {:.1e})", n,
                                  error, error <= scene.tolerance ? "within" : "still above", scene.tolerance));
       return;

@@ -34,7 +34,7 @@ const IntegratorMethod& method_named(const std::string& name) {
 
 /// The local error asked of each step for an error over the whole run near the tolerance wanted. Errors of undamped motion grow with its
 /// periods, so this is a start, not a promise: a run's error budget measures what was reached.
-constexpr double local_share = 0.05;
+constexpr double local_share = 0.005;
 
 /// Sizes that each state's error is measured against: the largest value so far of the group it belongs to, and never less than a
 /// small part of what the energy at the start could make of it (so that a state that starts at zero has a size).

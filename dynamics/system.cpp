@@ -9,6 +9,14 @@
 
 #include <cmath>
 
+// The two inner loops are compiled twice, for any x86-64 and for one with AVX2 and FMA; the loader picks. Everything they call is inlined, so that
+// it is compiled twice too.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
+#define FLEXBOOM_INNER_LOOP __attribute__((target_clones("arch=haswell", "default"), flatten))
+#else
+#define FLEXBOOM_INNER_LOOP
+#endif
+
 namespace flexboom {
 
 using Eigen::Matrix3d;
@@ -269,6 +277,7 @@ Vector3d to_inertial(const double* q, const Vector3d& a) {
 
 }  // namespace
 
+FLEXBOOM_INNER_LOOP
 void System::derivative(const double* y, std::span<const char> contact, Workspace& w, double* y_dot) const {
   const Layout& l = impl_->layout;
   const double* u = y + l.u_begin();
@@ -283,6 +292,7 @@ void System::derivative(const double* y, std::span<const char> contact, Workspac
   y_dot[l.dissipated()] = dissipated_power(impl_->model, u, l.base);
 }
 
+FLEXBOOM_INNER_LOOP
 void System::jacobian(const double* y, std::span<const char> contact, Workspace& w) const {
   const Layout& l = impl_->layout;
   const int inputs = l.p + l.u;

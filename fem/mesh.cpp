@@ -260,8 +260,8 @@ void Mesh::validate() const {
       validate_rigid(bodies[i].mass, bodies[i].inertia, bodies[i].offset);
     });
   }
-  for (const auto& [name, set] : node_sets) {
-    within(fmt::format("mesh: node set \"{}\"", name), [&] { validate_set(*this, set); });
+  for (const auto& set : node_sets) {
+    within(fmt::format("mesh: node set \"{}\"", set.first), [&] { validate_set(*this, set.second); });
   }
 }
 
