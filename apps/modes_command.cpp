@@ -48,7 +48,9 @@ double peak_memory_mb() {
 void write_shapes(const std::filesystem::path& file, const ReducedBody& body) {
   VtkGrid grid;
   grid.points = body.display.points;
-  for (const std::vector<int>& line : body.display.lines) grid.cells.push_back({4, line});
+  constexpr int vtk_line = 3;  // two points: meshio skips polylines
+  for (const std::vector<int>& line : body.display.lines)
+    for (size_t k = 0; k + 1 < line.size(); ++k) grid.cells.push_back({vtk_line, {line[k], line[k + 1]}});
   for (int k = 0; k < body.n(); ++k) {
     Eigen::MatrixXd field(3, grid.points.cols());
     for (Eigen::Index i = 0; i < field.cols(); ++i) field.col(i) = body.display.S[static_cast<size_t>(i)].col(k);

@@ -158,7 +158,7 @@ Pose pose_at(const Scene& scene, const System& system, const Eigen::VectorXd& y)
 
 namespace {
 
-constexpr int vtk_polyline = 4, vtk_hexahedron = 12;
+constexpr int vtk_line = 3, vtk_hexahedron = 12;  // lines of two points: meshio skips polylines
 
 /// The whole scene at one time as one grid; cell data "body" numbers hub and booms from 0.
 VtkGrid grid_of(const Pose& pose, const System& system) {
@@ -176,10 +176,10 @@ VtkGrid grid_of(const Pose& pose, const System& system) {
     grid.points.middleCols(at, pose.booms[b].cols()) = pose.booms[b];
     displacement.middleCols(at, pose.booms[b].cols()) = pose.deflection[b];
     for (const std::vector<int>& line : system.appendages()[b].body.display.lines) {
-      VtkGrid::Cell cell{vtk_polyline, line};
-      for (int& p : cell.points) p += static_cast<int>(at);
-      grid.cells.push_back(std::move(cell));
-      body.push_back(static_cast<double>(b + 1));
+      for (size_t k = 0; k + 1 < line.size(); ++k) {
+        grid.cells.push_back({vtk_line, {line[k] + static_cast<int>(at), line[k + 1] + static_cast<int>(at)}});
+        body.push_back(static_cast<double>(b + 1));
+      }
     }
     at += pose.booms[b].cols();
   }

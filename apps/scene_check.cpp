@@ -325,7 +325,9 @@ void check_accuracy(Faults& faults, const Scene& scene) {
 }
 
 void check_integrator(Faults& faults, const Scene& scene) {
-  check_name_among(faults, "integrator.method", scene.integrator, names_of(integrator_methods()));
+  std::vector<std::string_view> methods = {"auto"};
+  for (const IntegratorMethod& m : integrator_methods()) methods.push_back(m.name);
+  check_name_among(faults, "integrator.method", scene.integrator, methods);
   if (scene.formulation == "multipliers") {
     faults.add("integrator.formulation", "\"multipliers\" is not available in this version; it must be \"relative\"");
   } else if (scene.formulation != "relative") {

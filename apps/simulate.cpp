@@ -224,9 +224,18 @@ double largest(const std::vector<OutputDifference>& differences) {
   return r;
 }
 
-IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks) {
+/// Adams keeps the energy of undamped motion at high order; with damping the equations are stiff (README of dynamics) and need BDF.
+std::string chosen_method(const Scene& scene, const System& system) {
+  if (scene.integrator != "auto") return scene.integrator;
+  const bool damped = std::any_of(system.appendages().begin(), system.appendages().end(), [](const Appendage& a) {
+    return a.hinge.mechanism.damping > 0 || (a.body.n() > 0 && a.body.De.cwiseAbs().maxCoeff() > 0);
+  });
+  return damped ? "bdf" : "adams";
+}
+
+IntegratorOptions integrator_options(const Scene& scene, const System& system, const RunHooks& hooks) {
   IntegratorOptions o;
-  o.method = scene.integrator;
+  o.method = chosen_method(scene, system);
   o.tolerance = scene.tolerance;
   o.duration = scene.duration;
   o.output_step = scene.output_step;
@@ -251,7 +260,7 @@ Run run_once(const Scene& scene, int refine, const RunHooks& hooks) {
   const Flyable f = make_system(scene, r.bodies);
   r.prepare_seconds = seconds_since(start);
   const auto flight = std::chrono::steady_clock::now();
-  r.motion = integrate(f.system, f.y0, integrator_options(scene, hooks));
+  r.motion = integrate(f.system, f.y0, integrator_options(scene, f.system, hooks));
   r.integrate_seconds = seconds_since(flight);
   r.outputs = output_table(scene, f.system, r.motion);
   return r;
@@ -354,8 +363,8 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
   for (const HingeScene& h : scene.hinges)
     plan.push_back(fmt::format("hinge {}: damping {:g} N m s/rad, stop {:g} N m/rad without damping of its own", h.body,
                                h.hinge.mechanism.damping, h.hinge.mechanism.stop_stiffness));
-  plan.push_back(fmt::format("integrator: {}, tolerance {:.1e}; damping of the method itself shows in energy_balance", scene.integrator,
-                             scene.tolerance));
+  plan.push_back(fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
+                             run.motion.summary.method, scene.integrator == "auto" ? "by the damping of the scene" : "as asked", scene.tolerance));
   plan.emplace_back("geometric stiffness: left out, its size is error_budget.linearisation");
   if (scene.orbit)
     plan.push_back(fmt::format("orbit: sets the LVLH frame (rate {:.6e} rad/s); gravity gradient left out, {:.1e} 1/s^2", scene.orbit->rate(),
@@ -374,7 +383,12 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks) {
   Run run = run_once(r.scene, 0, hooks);
   describe(r.scene, run, r.plan);
   r.warnings = r.scene.warnings;
-  if (r.scene.error_budget && !run.motion.summary.interrupted) {
+  // The repeats cost about four times the run; a long one is not repeated unasked.
+  constexpr long worth_repeating = 2'000'000;
+  const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating;
+  if (r.scene.error_budget && !repeat)
+    r.plan.push_back(fmt::format("error budget: not measured, its repeats would cost four times {} evaluations", run.motion.summary.rhs_evaluations));
+  if (r.scene.error_budget && repeat && !run.motion.summary.interrupted) {
     const auto start = std::chrono::steady_clock::now();
     r.budget = measure_budget(r.scene, run, silent, r.plan);
     r.budget_seconds = seconds_since(start);
