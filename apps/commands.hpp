@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -7,7 +8,20 @@
 namespace flexboom {
 
 /// Exit codes promised to scripts.
-enum ExitCode : int { exit_ok = 0, exit_usage = 2, exit_input = 3, exit_numerical = 4, exit_check_failed = 5, exit_interrupted = 130 };
+enum ExitCode : int {
+  exit_ok = 0,
+  exit_usage = 2,
+  exit_input = 3,
+  exit_numerical = 4,
+  exit_check_failed = 5,
+  exit_interrupted = 130
+};
+
+/// Notes, warnings and errors. A stderr that is full or closed is no reason to fail: unlike fmt::print it never throws.
+inline void print_note(const std::string& text) { std::fputs((text + '\n').c_str(), stderr); }
+
+/// Is this file a body? (Its first key says so; anything else goes through the scene reader and its errors.)
+bool is_body_file(const std::string& path);
 
 /// Options that every command has.
 struct CommonOptions {

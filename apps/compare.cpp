@@ -3,8 +3,8 @@
 #include "fem/check.hpp"
 #include "reduction/eq14.hpp"
 
-#include <Eigen/SVD>
 #include <fmt/format.h>
+#include <Eigen/SVD>
 
 #include <chrono>
 #include <cmath>
@@ -42,7 +42,8 @@ double subspace_error(const Mesh& mesh, const Assembly& assembly, const ModalBas
   MatrixXd cross = MatrixXd::Zero(n, n), own = MatrixXd::Zero(n, n), closed = MatrixXd::Zero(n, n);
   for_each_mass_point(
       mesh, assembly.dofs,
-      [&](double dm, const Eigen::Vector3d& u0, const Eigen::Ref<const Eigen::Matrix3Xd>& N, std::span<const int> dofs) {
+      [&](double dm, const Eigen::Vector3d& u0, const Eigen::Ref<const Eigen::Matrix3Xd>& N,
+          std::span<const int> dofs) {
         MatrixXd q(static_cast<Eigen::Index>(dofs.size()), n);
         for (size_t i = 0; i < dofs.size(); ++i) q.row(static_cast<Eigen::Index>(i)) = basis.Phi.row(dofs[i]);
         const MatrixXd u = N * q;
@@ -121,7 +122,8 @@ std::vector<TransientComparison> compare_transients(const Scene& given) {
   };
   const OutputTable reference = fly("eq14", BeamTheory::euler_bernoulli, false);
   std::vector<TransientComparison> all;
-  all.push_back({"Euler-Bernoulli elements, line mass", compare_outputs(fly("beam", BeamTheory::euler_bernoulli, false), reference, {})});
+  all.push_back({"Euler-Bernoulli elements, line mass",
+                 compare_outputs(fly("beam", BeamTheory::euler_bernoulli, false), reference, {})});
   all.push_back({"+ rotary inertia", compare_outputs(fly("beam", BeamTheory::euler_bernoulli, true), reference, {})});
   all.push_back({"+ shear (Timoshenko)", compare_outputs(fly("beam", BeamTheory::timoshenko, true), reference, {})});
   return all;

@@ -2,13 +2,17 @@
 #include "apps/version.hpp"
 #include "fem/check.hpp"
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <Eigen/Core>
-#include <fmt/format.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <functional>
+#include <sstream>
+#include <system_error>
 
 namespace {
 
@@ -27,7 +31,6 @@ struct CommandLine {
 
   CommandLine() {
     app.set_version_flag("--version", version_text());
-    app.require_subcommand(1);
     add_run();
     add_check();
     add_modes();
@@ -38,7 +41,7 @@ struct CommandLine {
   CLI::App* command(const std::string& name, const std::string& what) {
     CLI::App* c = app.add_subcommand(name, what);
     c->add_flag("--json", common.json, "One JSON document on stdout, nothing else");
-    c->add_flag("--quiet", common.quiet, "No progress and no summary");
+    c->add_flag("--quiet", common.quiet, "Print nothing but errors, and the document of --json");
     c->add_option("--out", common.out, "Output folder");
     c->add_option("--threads", common.threads, "Threads of the linear algebra")->check(CLI::Range(1, 1024));
     c->set_version_flag("--version", version_text());
@@ -74,7 +77,7 @@ struct CommandLine {
     c->add_option("--backend", modes.backend, "Eigen-solver: arpack, spectra or dense");
     c->add_option("--clamp", modes.clamp, "Node set that is fixed (default: the body's)");
     c->add_option("--material", modes.material, "E,nu,rho of every segment, instead of the file's");
-    c->add_flag("--free", modes.free, "No clamp");
+    c->add_flag("--free", modes.free, "No clamp")->excludes("--clamp");
     c->add_option("--vtu", modes.vtu, "Write the shapes to this .vtu file");
     c->callback([this] { action = [this] { return modes_command(modes, common); }; });
   }
@@ -96,6 +99,33 @@ struct CommandLine {
   }
 };
 
+/// Text still on its way to stdout must arrive: a full disk behind a redirection is an error, not a success.
+void flush_stdout() {
+  errno = 0;
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    throw InputError(fmt::format("cannot write to standard output: {}", std::strerror(errno)));
+}
+
+/// Parses the line and runs its command. @throws InputError, NumericalError.
+int run_line(int argc, char** argv) {
+  CommandLine line;
+  try {
+    line.app.parse(argc, argv);
+    if (!line.action) throw CLI::RequiredError("A command");
+  } catch (const CLI::ParseError& e) {
+    std::ostringstream out, err;
+    const int code = line.app.exit(e, out, err) == 0 ? exit_ok : exit_usage;
+    std::fputs(err.str().c_str(), stderr);
+    fmt::print("{}", out.str());
+    flush_stdout();
+    return code;
+  }
+  Eigen::setNbThreads(line.common.threads);
+  const int code = line.action();
+  flush_stdout();
+  return code;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -104,22 +134,18 @@ int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a full quota is an error of write(), not a death
 #endif
   try {
-    CommandLine line;
-    try {
-      line.app.parse(argc, argv);
-    } catch (const CLI::ParseError& e) {
-      return line.app.exit(e) == 0 ? exit_ok : exit_usage;
-    }
-    Eigen::setNbThreads(line.common.threads);
-    return line.action();
+    return run_line(argc, argv);
   } catch (const InputError& e) {
-    fmt::print(stderr, "error: {}\n", e.what());
+    print_note(fmt::format("error: {}", e.what()));
+    return exit_input;
+  } catch (const std::system_error& e) {  // the operating system refused: a file, a folder, a stream
+    print_note(fmt::format("error: {}", e.what()));
     return exit_input;
   } catch (const NumericalError& e) {
-    fmt::print(stderr, "error: {}\n", e.what());
+    print_note(fmt::format("error: {}", e.what()));
     return exit_numerical;
   } catch (const std::exception& e) {
-    fmt::print(stderr, "internal error: {}\n", e.what());
+    print_note(fmt::format("internal error: {}", e.what()));
     return exit_numerical;
   }
 }

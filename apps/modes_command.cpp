@@ -6,8 +6,8 @@
 #include "reduction/inertia_invariants.hpp"
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <sys/resource.h>
+#include <nlohmann/json.hpp>
 
 #include <chrono>
 #include <cstdio>
@@ -30,7 +30,8 @@ Material parse_material(const std::string& text) {
 
 BodyScene body_of(const ModesArguments& a) {
   const std::string extension = std::filesystem::path(a.model).extension().string();
-  require(extension == ".toml", fmt::format("{}: this version reads bodies from .toml files, not '{}'", a.model, extension));
+  require(extension == ".toml",
+          fmt::format("{}: this version reads bodies from .toml files, not '{}'", a.model, extension));
   BodyScene body = read_body(a.model);
   if (a.material)
     for (BeamSegment& s : body.geometry.segments) s.material = parse_material(*a.material);
@@ -54,7 +55,8 @@ void write_shapes(const std::filesystem::path& file, const ReducedBody& body) {
   for (int k = 0; k < body.n(); ++k) {
     Eigen::MatrixXd field(3, grid.points.cols());
     for (Eigen::Index i = 0; i < field.cols(); ++i) field.col(i) = body.display.S[static_cast<size_t>(i)].col(k);
-    grid.point_data.emplace_back(fmt::format("mode_{:03d}_{}", k + 1, body.coordinates[static_cast<size_t>(k)].kind), field);
+    grid.point_data.emplace_back(fmt::format("mode_{:03d}_{}", k + 1, body.coordinates[static_cast<size_t>(k)].kind),
+                                 field);
   }
   write_vtu(file, grid);
 }
@@ -94,23 +96,36 @@ int modes_command(const ModesArguments& a, const CommonOptions& common) {
   if (common.json) {
     std::vector<std::string_view> kinds;
     for (const ModeKind k : basis.kind) kinds.push_back(name_of(k));
-    ordered_json j = {{"frequencies_hz", std::vector<double>(hz.begin(), hz.end())}, {"kinds", kinds}, {"dofs", dofs},
-                      {"elements", mesh.elements.size()}, {"mass", reduced.m},
-                      {"seconds", {{"mesh", mesh_seconds}, {"assemble", assemble_seconds}, {"factor", s.factor_seconds},
-                                   {"eigen", s.eigen_seconds}, {"total", mesh_seconds + assemble_seconds + eigen_seconds}}},
-                      {"backend", s.backend}, {"shift", s.sigma}, {"residual_max", s.residual_max},
-                      {"orthogonality_error", s.orthogonality_error}, {"sturm_count", s.sturm_count}, {"pairs", s.pairs},
+    ordered_json j = {{"frequencies_hz", std::vector<double>(hz.begin(), hz.end())},
+                      {"kinds", kinds},
+                      {"dofs", dofs},
+                      {"elements", mesh.elements.size()},
+                      {"mass", reduced.m},
+                      {"seconds",
+                       {{"mesh", mesh_seconds},
+                        {"assemble", assemble_seconds},
+                        {"factor", s.factor_seconds},
+                        {"eigen", s.eigen_seconds},
+                        {"total", mesh_seconds + assemble_seconds + eigen_seconds}}},
+                      {"backend", s.backend},
+                      {"shift", s.sigma},
+                      {"residual_max", s.residual_max},
+                      {"orthogonality_error", s.orthogonality_error},
+                      {"sturm_count", s.sturm_count},
+                      {"pairs", s.pairs},
                       {"peak_memory_mb", peak_memory_mb()}};
     fmt::print("{}\n", j.dump(2));
     return exit_ok;
   }
+  if (common.quiet) return exit_ok;
   fmt::print("{}: {} elements, {} unknowns, mass {:.9g} kg\n", body.name, mesh.elements.size(), dofs, reduced.m);
   for (Eigen::Index k = 0; k < hz.size(); ++k)
     fmt::print("{:4}  {:18.10f} Hz  {}\n", k + 1, hz[k], name_of(basis.kind[static_cast<size_t>(k)]));
-  if (!common.quiet)
-    fmt::print(stderr, "{}: residual {:.1e}, orthogonality {:.1e}, Sturm count {} below {:.6g} Hz: no mode missed; {:.3f} s\n", s.backend,
-               s.residual_max, s.orthogonality_error, s.sturm_count, std::sqrt(std::max(0.0, s.sturm_shift)) / (2 * std::numbers::pi),
-               mesh_seconds + assemble_seconds + eigen_seconds);
+  print_note(
+      fmt::format("{}: residual {:.1e}, orthogonality {:.1e}, Sturm count {} below {:.6g} Hz: no mode missed; {:.3f} s",
+                  s.backend, s.residual_max, s.orthogonality_error, s.sturm_count,
+                  std::sqrt(std::max(0.0, s.sturm_shift)) / (2 * std::numbers::pi),
+                  mesh_seconds + assemble_seconds + eigen_seconds));
   return exit_ok;
 }
 

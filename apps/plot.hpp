@@ -17,7 +17,11 @@ struct Plot {
   bool log_x = false, log_y = false;
 };
 
-/// A line plot as one <svg> element: axes with round ticks, a legend, at most about 2000 points a curve (extremes of each bin are kept).
+/// Text that can stand between the tags of XML and HTML.
+std::string escaped(const std::string&);
+
+/// A line plot as one <svg> element: axes with round ticks, a legend, at most about 2000 points a curve (extremes of
+/// each bin are kept).
 std::string svg(const Plot&);
 
 }  // namespace flexboom

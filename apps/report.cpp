@@ -17,7 +17,7 @@
 namespace flexboom {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
+using json = nlohmann::ordered_json;  // tables in the order of the file
 
 namespace {
 
@@ -59,8 +59,8 @@ Table read_table(const fs::path& path) {
   table.columns.resize(table.names.size());
   for (size_t number = 2; std::getline(in, line); ++number) {
     const std::vector<std::string> parts = split(line);
-    require(parts.size() == table.names.size(),
-            fmt::format("{}:{}: {} values, the header names {}", path.string(), number, parts.size(), table.names.size()));
+    require(parts.size() == table.names.size(), fmt::format("{}:{}: {} values, the header names {}", path.string(),
+                                                            number, parts.size(), table.names.size()));
     for (size_t i = 0; i < parts.size(); ++i) {
       double v = 0;
       const auto [end, error] = std::from_chars(parts[i].data(), parts[i].data() + parts[i].size(), v);
@@ -89,7 +89,8 @@ Folder read_folder(const fs::path& folder) {
   return f;
 }
 
-Curve curve(const Table& table, const std::string& column, const std::string& name, double factor = 1, double offset = 0) {
+Curve curve(const Table& table, const std::string& column, const std::string& name, double factor = 1,
+            double offset = 0) {
   Curve c{name, table.column("t"), table.column(column)};
   for (double& v : c.y) v = factor * (v - offset);
   return c;
@@ -99,7 +100,8 @@ std::vector<Plot> plots(const Folder& f) {
   const Table& t = f.table;
   std::vector<Plot> all;
   Plot rotation{"Hub rotation from the start", "t [s]", "rotation vector [deg]", {}};
-  for (const char* axis : {"x", "y", "z"}) rotation.curves.push_back(curve(t, std::string("hub.rotation.") + axis, axis, degrees));
+  for (const char* axis : {"x", "y", "z"})
+    rotation.curves.push_back(curve(t, std::string("hub.rotation.") + axis, axis, degrees));
   all.push_back(rotation);
   Plot angle{"Hinge angle, from the stop", "t [s]", "Theta - threshold [deg]", {}};
   for (const HingeScene& h : f.scene.hinges)
@@ -109,7 +111,8 @@ std::vector<Plot> plots(const Folder& f) {
   for (const HingeScene& h : f.scene.hinges) tip.curves.push_back(curve(t, h.body + ".tip.y", h.body, 1e3));
   if (!tip.curves.empty()) all.push_back(tip);
   Plot energy{"Energy", "t [s]", "energy [J]", {}};
-  for (const char* kind : {"kinetic", "elastic", "dissipated"}) energy.curves.push_back(curve(t, std::string("energy.") + kind, kind));
+  for (const char* kind : {"kinetic", "elastic", "dissipated"})
+    energy.curves.push_back(curve(t, std::string("energy.") + kind, kind));
   all.push_back(energy);
   return all;
 }
@@ -117,35 +120,43 @@ std::vector<Plot> plots(const Folder& f) {
 std::string cell(const json& v) {
   if (v.is_number_float()) return fmt::format("{:.4g}", v.get<double>());
   if (v.is_null()) return "not measured";
-  return v.is_string() ? v.get<std::string>() : v.dump();
+  return v.is_string() ? escaped(v.get<std::string>()) : v.dump();
 }
 
-std::string rows(const json& object) {
+std::string rows(const json& object, const std::string& prefix = "") {
   std::string r;
   for (const auto& [key, value] : object.items())
-    if (!value.is_structured()) r += fmt::format("<tr><th>{}</th><td>{}</td></tr>\n", key, cell(value));
+    if (!value.is_structured())
+      r += fmt::format("<tr><th>{}{}</th><td>{}</td></tr>\n", prefix, escaped(key), cell(value));
   return r;
 }
 
 std::string bodies_table(const json& bodies) {
-  std::string r = "<table><tr><th>body</th><th>structure</th><th>unknowns</th><th>modes</th><th>frequencies, clamped [Hz]</th></tr>\n";
+  std::string r =
+      "<table><tr><th>body</th><th>structure</th><th>unknowns</th><th>modes</th><th>frequencies, clamped "
+      "[Hz]</th></tr>\n";
   for (const json& b : bodies) {
     std::string hz;
-    for (const json& f : b["frequencies_hz"]) hz += fmt::format("{:.6g} ", f.get<double>());
-    r += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", cell(b["name"]), cell(b["structure"]),
-                     cell(b["dofs"]), cell(b["modes"]), hz);
+    for (const json& f : b.at("frequencies_hz")) hz += fmt::format("{}{:.6g}", hz.empty() ? "" : ", ", f.get<double>());
+    r += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", cell(b.at("name")),
+                     cell(b.at("structure")), cell(b.at("dofs")), cell(b.at("modes")), hz);
   }
   return r + "</table>\n";
 }
 
-/// Data of the moving picture: per boom its hinge and length, per frame time, hub rotation, hinge angles and tip deflections.
+/// Data of the moving picture: per boom its hinge and length, per frame time, hub rotation, hinge angles and tip
+/// deflections.
 json animation_data(const Folder& f) {
   constexpr size_t most_frames = 600;
   json booms = json::array();
   for (const HingeScene& h : f.scene.hinges) {
-    const auto b = std::find_if(f.scene.bodies.begin(), f.scene.bodies.end(), [&](const BodyScene& s) { return s.name == h.body; });
+    const auto b = std::find_if(f.scene.bodies.begin(), f.scene.bodies.end(),
+                                [&](const BodyScene& s) { return s.name == h.body; });
     const auto v = [](const Eigen::Vector3d& a) { return json{a.x(), a.y(), a.z()}; };
-    booms.push_back({{"name", h.body}, {"point", v(h.hinge.point)}, {"s", v(h.hinge.stowed)}, {"n", v(h.hinge.outward)},
+    booms.push_back({{"name", h.body},
+                     {"point", v(h.hinge.point)},
+                     {"s", v(h.hinge.stowed)},
+                     {"n", v(h.hinge.outward)},
                      {"length", b == f.scene.bodies.end() ? 0.0 : b->geometry.length()}});
   }
   const std::vector<double>& t = f.table.column("t");
@@ -165,10 +176,15 @@ json animation_data(const Folder& f) {
   }
   const double exaggeration = most > 0 ? std::pow(10, std::floor(std::log10(0.1 / most))) : 1;
   const Eigen::Vector3d& size = f.scene.hub.size;
-  return {{"size", {size.x(), size.y(), size.z()}}, {"booms", booms}, {"frames", frames}, {"deflection", std::max(1.0, exaggeration)}, {"rotation", 30}};
+  return {{"size", {size.x(), size.y(), size.z()}},
+          {"booms", booms},
+          {"frames", frames},
+          {"deflection", std::max(1.0, exaggeration)},
+          {"rotation", 30}};
 }
 
-constexpr const char* style = R"(<style>body{font:15px sans-serif;max-width:820px;margin:2em auto;color:#222}table{border-collapse:collapse;margin:1em 0}
+constexpr const char* style =
+    R"(<style>body{font:15px sans-serif;max-width:820px;margin:2em auto;color:#222}table{border-collapse:collapse;margin:1em 0}
 td,th{border:1px solid #ccc;padding:3px 9px;text-align:left;font-variant-numeric:tabular-nums}th{background:#f4f4f4;font-weight:600}
 canvas{border:1px solid #ccc;width:100%}li{margin:.2em 0}</style>)";
 
@@ -188,34 +204,49 @@ line(pts,['#0072b2','#d55e00','#009e73','#cc79a7','#e69f00','#56b4e9'][i%6],3);}
 g.fillStyle='#222';g.font='14px sans-serif';g.fillText('t = '+f[0].toFixed(3)+' s',12,20);
 if(run)n=(n+1)%D.frames.length;requestAnimationFrame(draw);}draw();</script>)";
 
+/// @throws json::exception when the summary lacks something.
+std::string page(const Folder& f) {
+  const json& s = f.summary;
+  const json data = animation_data(f);
+  std::string h = fmt::format(
+      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>flexboom: "
+      "{0}</title>{1}</head><body>\n<h1>{0}</h1>\n",
+      escaped(f.scene.name), style);
+  h += fmt::format("<p>{} s simulated in {} s ({} times real time), {} steps, {} contacts and releases.</p>\n",
+                   cell(s.at("simulated_seconds")), cell(s.at("seconds").at("integrate")),
+                   cell(s.at("real_time_factor")), cell(s.at("steps")), cell(s.at("events")));
+  h += fmt::format(
+      "<canvas id=\"view\" width=\"820\" height=\"420\"></canvas><p>Drawn larger than it is: hub rotation {} times, "
+      "boom deflection {} times. Click to stop or go on.</p>\n",
+      cell(data.at("rotation")), cell(data.at("deflection")));
+  for (const Plot& p : plots(f)) h += svg(p);
+  h += "<h2>How wrong is it?</h2>\n<table>" + rows(s.at("error_budget")) +
+       fmt::format("<tr><th>energy balance</th><td>{}</td></tr><tr><th>momentum drift</th><td>{}</td></tr></table>\n",
+                   cell(s.at("energy_balance")), cell(s.at("momentum_drift")));
+  h += "<h2>What was flown</h2>\n" + bodies_table(s.at("bodies")) + "<ul>\n";
+  for (const json& line : s.at("plan")) h += "<li>" + escaped(line.get<std::string>()) + "</li>\n";
+  for (const json& line : s.at("warnings")) h += "<li><b>warning:</b> " + escaped(line.get<std::string>()) + "</li>\n";
+  h += "</ul><h2>The run</h2><table>" + rows(s) + rows(s.at("seconds"), "wall seconds: ") + "</table>\n";
+  return h + "<script>const D=" + data.dump() + ";</script>" + player + "</body></html>\n";
+}
+
 }  // namespace
 
 std::string report_html(const fs::path& folder) {
   const Folder f = read_folder(folder);
-  const json& s = f.summary;
-  const json data = animation_data(f);
-  std::string h = fmt::format("<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>flexboom: {0}</title>{1}</head><body>\n<h1>{0}</h1>\n",
-                              f.scene.name, style);
-  h += fmt::format("<p>{} s simulated in {} s ({} times real time), {} steps, {} contacts and releases.</p>\n",
-                   cell(s["simulated_seconds"]), cell(s["seconds"]["integrate"]), cell(s["real_time_factor"]), cell(s["steps"]), cell(s["events"]));
-  h += fmt::format("<canvas id=\"view\" width=\"820\" height=\"420\"></canvas><p>Hub rotation drawn {}, boom deflection {} times as large; click to stop or go on.</p>\n",
-                   cell(data["rotation"]), cell(data["deflection"]));
-  for (const Plot& p : plots(f)) h += svg(p);
-  h += "<h2>How wrong is it?</h2>\n<table>" + rows(s["error_budget"]) +
-       fmt::format("<tr><th>energy balance</th><td>{}</td></tr><tr><th>momentum drift</th><td>{}</td></tr></table>\n",
-                   cell(s["energy_balance"]), cell(s["momentum_drift"]));
-  h += "<h2>What was flown</h2>\n" + bodies_table(s["bodies"]) + "<ul>\n";
-  for (const json& line : s["plan"]) h += "<li>" + line.get<std::string>() + "</li>\n";
-  for (const json& line : s["warnings"]) h += "<li><b>warning:</b> " + line.get<std::string>() + "</li>\n";
-  h += "</ul><h2>The run</h2><table>" + rows(s) + rows(s["seconds"]) + "</table>\n";
-  return h + "<script>const D=" + data.dump() + ";</script>" + player + "</body></html>\n";
+  try {
+    return page(f);
+  } catch (const json::exception& e) {
+    throw InputError(fmt::format("{}: {}", (folder / "summary.json").string(), e.what()));
+  }
 }
 
 std::string overview_svg(const fs::path& folder) {
   const std::vector<Plot> all = plots(read_folder(folder));
   const int height = all.front().height;
-  std::string s = fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\">\n", all.front().width,
-                              height * static_cast<int>(all.size()));
+  std::string s =
+      fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\">\n",
+                  all.front().width, height * static_cast<int>(all.size()));
   for (size_t i = 0; i < all.size(); ++i)
     s += fmt::format("<g transform=\"translate(0 {})\">{}</g>\n", static_cast<int>(i) * height, svg(all[i]));
   return s + "</svg>\n";

@@ -31,11 +31,15 @@ std::string reason() { return errno != 0 ? std::strerror(errno) : "unknown reaso
 }  // namespace
 
 void write_file(const fs::path& path, const std::string& text) {
+  write_file(path, [&text](std::ostream& out) { out.write(text.data(), static_cast<std::streamsize>(text.size())); });
+}
+
+void write_file(const fs::path& path, const std::function<void(std::ostream&)>& write) {
   fs::path temporary = path;
   temporary += ".part";
   errno = 0;
   std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
+  write(out);
   out.close();
   if (!out) {
     const std::string why = reason();
@@ -57,13 +61,16 @@ void prepare_folder(const fs::path& folder) {
   fs::remove(probe, error);
 }
 
-std::string trajectory_csv(const OutputTable& table) {
-  fmt::memory_buffer out;
-  fmt::format_to(std::back_inserter(out), "{}\n", fmt::join(table.names, ","));
-  for (Eigen::Index row = 0; row < table.values.rows(); ++row)
+void print_trajectory_csv(std::ostream& out, const OutputTable& table) {
+  fmt::memory_buffer line;
+  fmt::format_to(std::back_inserter(line), "{}\n", fmt::join(table.names, ","));
+  for (Eigen::Index row = 0; row < table.values.rows() && out; ++row) {
     for (Eigen::Index c = 0; c < table.values.cols(); ++c)
-      fmt::format_to(std::back_inserter(out), "{:.17g}{}", table.values(row, c), c + 1 < table.values.cols() ? ',' : '\n');
-  return fmt::to_string(out);
+      fmt::format_to(std::back_inserter(line), "{:.17g}{}", table.values(row, c),
+                     c + 1 < table.values.cols() ? ',' : '\n');
+    out.write(line.data(), static_cast<std::streamsize>(line.size()));
+    line.clear();
+  }
 }
 
 std::string events_csv(const System& system, const Trajectory& motion) {
@@ -77,8 +84,17 @@ std::string events_csv(const System& system, const Trajectory& motion) {
 namespace {
 
 ordered_json budget_json(const ErrorBudget& b) {
-  if (!b.measured) return {{"discretisation", nullptr}, {"truncation", nullptr}, {"time", nullptr}, {"linearisation", nullptr}, {"total", nullptr}};
-  return {{"discretisation", b.discretisation}, {"truncation", b.truncation}, {"time", b.time}, {"linearisation", b.linearisation}, {"total", b.total()}};
+  if (!b.measured)
+    return {{"discretisation", nullptr},
+            {"truncation", nullptr},
+            {"time", nullptr},
+            {"linearisation", nullptr},
+            {"total", nullptr}};
+  return {{"discretisation", b.discretisation},
+          {"truncation", b.truncation},
+          {"time", b.time},
+          {"linearisation", b.linearisation},
+          {"total", b.total()}};
 }
 
 ordered_json bodies_json(const RunResult& r) {
@@ -86,8 +102,12 @@ ordered_json bodies_json(const RunResult& r) {
   for (const PreparedBody& p : r.bodies) {
     std::vector<double> hz;
     for (const Coordinate& c : p.body.coordinates) hz.push_back(c.frequency_hz);
-    bodies.push_back({{"name", p.body.name}, {"structure", p.body.structure}, {"dofs", p.dofs}, {"modes", p.body.n()},
-                      {"frequencies_hz", hz}, {"mass", p.body.m}});
+    bodies.push_back({{"name", p.body.name},
+                      {"structure", p.body.structure},
+                      {"dofs", p.dofs},
+                      {"modes", p.body.n()},
+                      {"frequencies_hz", hz},
+                      {"mass", p.body.m}});
   }
   return bodies;
 }
@@ -96,8 +116,11 @@ ordered_json checks_json(const RunResult& r) {
   ordered_json checks = ordered_json::array();
   for (const PreparedBody& p : r.bodies)
     for (const InvariantCheck& c : p.checks)
-      checks.push_back({{"name", p.body.name + "." + c.name}, {"value", c.value}, {"reference", c.reference},
-                        {"relative_error", c.relative_error}, {"passed", c.passed}});
+      checks.push_back({{"name", p.body.name + "." + c.name},
+                        {"value", c.value},
+                        {"reference", c.reference},
+                        {"relative_error", c.relative_error},
+                        {"passed", c.passed}});
   return checks;
 }
 
@@ -108,7 +131,9 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   ordered_json j;
   j["scene"] = r.scene.name;
   j["version"] = version;
-  j["seconds"] = {{"prepare", r.prepare_seconds}, {"integrate", r.integrate_seconds}, {"write", write_seconds},
+  j["seconds"] = {{"prepare", r.prepare_seconds},
+                  {"integrate", r.integrate_seconds},
+                  {"write", write_seconds},
                   {"budget", r.budget_seconds},
                   {"total", r.prepare_seconds + r.integrate_seconds + write_seconds + r.budget_seconds}};
   j["steps"] = s.steps;
@@ -184,7 +209,8 @@ VtkGrid grid_of(const Pose& pose, const System& system) {
     at += pose.booms[b].cols();
   }
   grid.point_data.emplace_back("displacement", displacement);
-  grid.cell_data.emplace_back("body", Eigen::Map<Eigen::RowVectorXd>(body.data(), static_cast<Eigen::Index>(body.size())));
+  grid.cell_data.emplace_back("body",
+                              Eigen::Map<Eigen::RowVectorXd>(body.data(), static_cast<Eigen::Index>(body.size())));
   return grid;
 }
 
@@ -205,15 +231,22 @@ void write_motion(const RunResult& r, const fs::path& folder) {
   write_pvd(folder / "motion.pvd", frames);
 }
 
-void write_results(const RunResult& r, const fs::path& folder) {
+ordered_json write_results(const RunResult& r, const fs::path& folder) {
   const auto start = std::chrono::steady_clock::now();
   const Flyable f = make_system(r.scene, r.bodies);
+  for (const char* old :
+       {"summary.json", "trajectory.csv", "events.csv", "motion.pvd", "report.html", "overview.svg"}) {
+    std::error_code ignored;
+    fs::remove(folder / old, ignored);
+  }
   write_file(folder / "scene.toml", to_toml(r.scene));
-  write_file(folder / "trajectory.csv", trajectory_csv(r.outputs));
+  write_file(folder / "trajectory.csv", [&r](std::ostream& out) { print_trajectory_csv(out, r.outputs); });
   write_file(folder / "events.csv", events_csv(f.system, r.trajectory));
   if (r.scene.vtu_step > 0) write_motion(r, folder);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  write_file(folder / "summary.json", summary_json(r, seconds).dump(2) + "\n");
+  ordered_json summary = summary_json(r, seconds);
+  write_file(folder / "summary.json", summary.dump(2) + "\n");
+  return summary;
 }
 
 }  // namespace flexboom

@@ -5,14 +5,15 @@
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include <atomic>
 #include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <sstream>
 
 namespace flexboom {
 
@@ -44,12 +45,13 @@ class InterruptGuard {
   struct sigaction before_int_ = {}, before_term_ = {};
 };
 
-/// One line on a terminal: percent, simulated / wall time, time left. Silent for work under a second and where stderr is no terminal.
+/// One line on a terminal: percent, simulated / wall time, time left. Silent for work under a second and where stderr
+/// is no terminal.
 class ProgressLine {
  public:
   explicit ProgressLine(bool wanted) : wanted_(wanted && isatty(STDERR_FILENO) == 1) {}
   ~ProgressLine() {
-    if (shown_) fmt::print(stderr, "\r{:70}\r", "");
+    if (shown_) std::fputs(fmt::format("\r{:79}\r", "").c_str(), stderr);
   }
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
@@ -61,8 +63,10 @@ class ProgressLine {
     if (wall < 1 || now - last_ < std::chrono::milliseconds(200)) return;
     last_ = now;
     shown_ = true;
-    fmt::print(stderr, "\r{:3.0f} %  {:.3g} of {:.3g} s simulated in {:.1f} s, {:.1f} s left   ", 100 * time / duration, time, duration, wall,
-               wall * (duration - time) / std::max(time, 1e-12));
+    const std::string line =
+        fmt::format("{:.0f} %  {:.3g} of {:.3g} s simulated in {:.1f} s, {:.3g} s left", 100 * time / duration, time,
+                    duration, wall, wall * (duration - time) / std::max(time, 1e-12));
+    std::fputs(fmt::format("\r{:79}", line).c_str(), stderr);
     std::fflush(stderr);
   }
 
@@ -103,14 +107,44 @@ Scene scene_of(const RunArguments& a) {
 void print_summary(const RunResult& r, const std::filesystem::path& folder) {
   const IntegrationSummary& s = r.trajectory.summary;
   for (const std::string& line : r.plan) fmt::print("{}\n", line);
-  fmt::print("\n{:g} s in {:.3f} s ({:.0f} times real time): {} steps, {} evaluations, {} events\n", r.trajectory.time.back(),
-             r.integrate_seconds, r.trajectory.time.back() / std::max(r.integrate_seconds, 1e-9), s.steps, s.rhs_evaluations,
+  fmt::print("\n{:g} s in {:.3f} s ({:.0f} times real time): {} steps, {} evaluations, {} events\n",
+             r.trajectory.time.back(), r.integrate_seconds,
+             r.trajectory.time.back() / std::max(r.integrate_seconds, 1e-9), s.steps, s.rhs_evaluations,
              r.trajectory.events.size());
   fmt::print("energy balance {:.1e}, momentum drift {:.1e} (relative)\n", s.energy_balance, s.momentum_drift);
   if (r.budget.measured)
-    fmt::print("errors of the outputs: discretisation {:.1e}, truncation {:.1e}, time {:.1e}, linearisation {:.1e}; total {:.1e}\n",
-               r.budget.discretisation, r.budget.truncation, r.budget.time, r.budget.linearisation, r.budget.total());
+    fmt::print(
+        "errors of the outputs: discretisation {:.1e}, truncation {:.1e}, time {:.1e}, linearisation {:.1e}; total "
+        "{:.1e}\n",
+        r.budget.discretisation, r.budget.truncation, r.budget.time, r.budget.linearisation, r.budget.total());
   fmt::print("results: {}\n", folder.string());
+}
+
+/// The line is gone again before anything else is printed.
+RunResult run_with_progress(const Scene& scene, bool wanted) {
+  ProgressLine progress(wanted);
+  return run_scene(scene, {&interrupted, [&progress](double t, double T) { progress(t, T); }});
+}
+
+/// Faults of a scene or body as the document of `check --json`; the error itself goes its usual way.
+void print_faults(const std::string& text) {
+  nlohmann::ordered_json faults = nlohmann::ordered_json::array();
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) faults.push_back(line);
+  fmt::print("{}\n", nlohmann::ordered_json{{"ok", false}, {"faults", faults}}.dump(2));
+}
+
+/// What `check` says of a file without faults.
+nlohmann::ordered_json checked(const std::string& name) {
+  if (is_body_file(name))
+    return {{"body", read_body(name).name}, {"warnings", nlohmann::ordered_json::array()}, {"ok", true}};
+  const Scene scene = load_scene(name);
+  validate(scene);
+  return {{"scene", scene.name},
+          {"bodies", scene.bodies.size()},
+          {"hinges", scene.hinges.size()},
+          {"warnings", scene.warnings},
+          {"ok", true}};
 }
 
 }  // namespace
@@ -120,37 +154,49 @@ int run_command(const RunArguments& a, const CommonOptions& common) {
   const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results") / scene.name : common.out;
   prepare_folder(folder);
   if (!common.quiet)
-    for (const std::string& w : scene.warnings) fmt::print(stderr, "warning: {}\n", w);
+    for (const std::string& w : scene.warnings) print_note("warning: " + w);
 
   const InterruptGuard guard;
-  ProgressLine progress(!common.quiet && !common.json);
-  const RunResult result = run_scene(scene, {&interrupted, [&progress](double t, double T) { progress(t, T); }});
-  write_results(result, folder);
+  const RunResult result = run_with_progress(scene, !common.quiet && !common.json);
+  const nlohmann::ordered_json summary = write_results(result, folder);
   if (a.report) {
     write_file(folder / "report.html", report_html(folder));
     write_file(folder / "overview.svg", overview_svg(folder));
   }
   if (common.json) {
-    fmt::print("{}\n", summary_json(result, 0).dump(2));
+    fmt::print("{}\n", summary.dump(2));
   } else if (!common.quiet) {
     print_summary(result, folder);
     if (a.report) fmt::print("report: {}\n", (folder / "report.html").string());
   }
-  if (!result.trajectory.summary.interrupted) return exit_ok;
-  if (!common.quiet) fmt::print(stderr, "interrupted at t = {:g} s; what was computed is in {}\n", result.trajectory.time.back(), folder.string());
+  if (!interrupted.load()) return exit_ok;
+  if (!common.quiet)
+    print_note(
+        result.trajectory.summary.interrupted
+            ? fmt::format("interrupted at t = {:g} s; what was computed is in {}", result.trajectory.time.back(),
+                          folder.string())
+            : fmt::format("interrupted after the run, which is whole, in {}; its errors may not have been measured",
+                          folder.string()));
   return exit_interrupted;
 }
 
 int check_command(const std::string& name, const CommonOptions& common) {
-  const Scene scene = load_scene(name);
-  validate(scene);
-  if (common.json) {
-    fmt::print("{}\n", nlohmann::ordered_json{{"scene", scene.name}, {"bodies", scene.bodies.size()}, {"hinges", scene.hinges.size()},
-                                              {"warnings", scene.warnings}, {"ok", true}}.dump(2));
-    return exit_ok;
+  try {
+    const nlohmann::ordered_json found = checked(name);
+    if (common.json) {
+      fmt::print("{}\n", found.dump(2));
+    } else if (!common.quiet) {
+      for (const auto& w : found["warnings"]) print_note("warning: " + w.get<std::string>());
+      if (found.contains("scene"))
+        fmt::print("{}: {} bodies, {} hinges: no faults\n", found["scene"].get<std::string>(),
+                   found["bodies"].get<int>(), found["hinges"].get<int>());
+      else
+        fmt::print("{}: no faults\n", found["body"].get<std::string>());
+    }
+  } catch (const InputError& e) {
+    if (common.json) print_faults(e.what());
+    throw;
   }
-  for (const std::string& w : scene.warnings) fmt::print(stderr, "warning: {}\n", w);
-  if (!common.quiet) fmt::print("{}: {} bodies, {} hinges: no faults\n", scene.name, scene.bodies.size(), scene.hinges.size());
   return exit_ok;
 }
 

@@ -28,10 +28,10 @@ struct BodyScene {
 
 /// A rigid hub. Inertia about its mass centre, which is the origin of its BRF.
 struct HubScene {
-  double mass = 0;                                     // [kg]
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();   // [kg m^2], as given
-  bool fixed = false;                                  // does not move at all
-  Eigen::Vector3d size = Eigen::Vector3d::Zero();      // box for pictures [m]
+  double mass = 0;                                    // [kg]
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // [kg m^2], as given
+  bool fixed = false;                                 // does not move at all
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();     // box for pictures [m]
 };
 
 struct HingeScene {
@@ -41,25 +41,26 @@ struct HingeScene {
   double start_rate = 0;   // [rad/s]
 };
 
-/// Circular orbit of the reference point: for attitude in the local-vertical local-horizontal frame (x along the velocity, z to the Earth).
+/// Circular orbit of the reference point: for attitude in the local-vertical local-horizontal frame (x along the
+/// velocity, z to the Earth).
 struct OrbitScene {
-  double altitude = 405e3;   // above the equatorial radius [m]
-  double inclination = 0;    // [rad]
-  double rate() const;       // mean motion [rad/s]
+  double altitude = 405e3;  // above the equatorial radius [m]
+  double inclination = 0;   // [rad]
+  double rate() const;      // mean motion [rad/s]
 };
 
 /// Everything `flexboom run` needs. Defaults are the values a file may leave out.
 struct Scene {
   std::string name;
-  double duration = 10;        // [s]
-  double output_step = 0.01;   // [s]
-  double vtu_step = 0;         // [s]; 0: no VTU files
-  double tolerance = 1e-6;     // [accuracy] tolerance
+  double duration = 10;              // [s]
+  double output_step = 0.01;         // [s]
+  double vtu_step = 0;               // [s]; 0: no VTU files
+  double tolerance = 1e-6;           // [accuracy] tolerance
   std::vector<std::string> outputs;  // [accuracy] outputs; empty: all
-  bool error_budget = true;    // [accuracy] budget: repeat the run with a finer everything and print the differences
-  std::string integrator = "auto";          // [integrator] method; "auto": bdf with any damping, adams without
-  std::string formulation = "relative";     // [integrator] formulation
-  double settle = -1;          // [integrator] settle, IntegratorOptions::settle
+  bool error_budget = true;  // [accuracy] budget: repeat the run with a finer everything and print the differences
+  std::string integrator = "auto";       // [integrator] method; "auto": bdf with any damping, adams without
+  std::string formulation = "relative";  // [integrator] formulation
+  double settle = -1;                    // [integrator] settle, IntegratorOptions::settle
   bool rescale_at_events = false;
   HubScene hub;
   Eigen::Vector3d start_rate = Eigen::Vector3d::Zero();      // [initial] hub angular velocity, hub axes [rad/s]
@@ -69,7 +70,6 @@ struct Scene {
   std::vector<HingeScene> hinges;
   std::vector<std::string> warnings;  // what was repaired or is odd (e.g. an inertia that is not symmetric)
 };
-
 
 /// Reads and checks everything; unknown keys are errors that name the nearest known key.
 /// @throws InputError with every fault found, one per line.

@@ -30,9 +30,9 @@ PreparedBody prepare_eq14(const BodyScene& b) {
   const Section s = section_of(segment.start, segment.material.nu, b.geometry.shear);
   const eq14::Boom boom{segment.length, segment.material.rho * s.A, segment.material.E * s.Iz};
   const bool all = b.directions == "all";
-  require(!all || b.modes % 2 == 0,
-          fmt::format("body {}: eq. 14 has equal modes in two planes: with directions = \"all\" give an even number of modes, not {}",
-                      b.name, b.modes));
+  require(!all || b.modes % 2 == 0, fmt::format("body {}: eq. 14 has equal modes in two planes: with directions = "
+                                                "\"all\" give an even number of modes, not {}",
+                                                b.name, b.modes));
   const int per_plane = all ? b.modes / 2 : b.modes;
   PreparedBody r;
   r.body = eq14::reduced_body(boom, per_plane, all ? eq14::Planes::xy_and_xz : eq14::Planes::xy, b.name);
@@ -53,7 +53,8 @@ PreparedBody prepare_beam(const BodyScene& b, int refine) {
     EigenOptions options;
     options.backend = b.backend;
     options.num_modes = b.modes;
-    const std::vector<ModeKind> kinds = b.directions == "all" ? std::vector<ModeKind>{} : std::vector{ModeKind::bending_y};
+    const std::vector<ModeKind> kinds =
+        b.directions == "all" ? std::vector<ModeKind>{} : std::vector{ModeKind::bending_y};
     basis = clamped_modes_of_kind(mesh, assembly, clamp, b.modes, kinds, options);
   }
   r.body = reduce(mesh, assembly, basis, b.name);
@@ -68,20 +69,22 @@ PreparedBody prepare_beam(const BodyScene& b, int refine) {
 }  // namespace
 
 PreparedBody prepare_body(const BodyScene& b, int refine) {
-  require(b.structure == "eq14" || b.structure == "beam" || b.structure == "rigid",
-          fmt::format("body {}: structure '{}' is not available; there are: 'beam', 'eq14', 'rigid'", b.name, b.structure));
+  require(
+      b.structure == "eq14" || b.structure == "beam" || b.structure == "rigid",
+      fmt::format("body {}: structure '{}' is not available; there are: 'beam', 'eq14', 'rigid'", b.name, b.structure));
   PreparedBody r = b.structure == "eq14" ? prepare_eq14(b) : prepare_beam(b, refine);
   apply_damping(r.body, b.damping);
   for (const InvariantCheck& c : r.checks)
     if (!c.passed)
-      throw NumericalError(fmt::format("body {}: invariant {} = {:.17g}, but {:.17g} by an independent route", b.name, c.name,
-                                       c.value, c.reference));
+      throw NumericalError(fmt::format("body {}: invariant {} = {:.17g}, but {:.17g} by an independent route", b.name,
+                                       c.name, c.value, c.reference));
   return r;
 }
 
 Flyable make_system(const Scene& scene, const std::vector<PreparedBody>& bodies) {
   // A hub that does not move needs no mass.
-  ReducedBody hub = scene.hub.fixed ? ReducedBody{} : rigid_body("hub", scene.hub.mass, Vector3d::Zero(), scene.hub.inertia);
+  ReducedBody hub =
+      scene.hub.fixed ? ReducedBody{} : rigid_body("hub", scene.hub.mass, Vector3d::Zero(), scene.hub.inertia);
   std::vector<Appendage> appendages;
   std::vector<double> angles;
   for (const PreparedBody& p : bodies) {
@@ -105,8 +108,9 @@ Flyable make_system(const Scene& scene, const std::vector<PreparedBody>& bodies)
 
 namespace {
 
-/// Roll, pitch, yaw (3-2-1: yaw about z, then pitch about y, then roll about x) of the hub against the local-vertical local-horizontal frame: x along
-/// the velocity, y against the orbit normal, z to the Earth. At t = 0 the start attitude is aligned with it; it turns at -n about its y.
+/// Roll, pitch, yaw (3-2-1: yaw about z, then pitch about y, then roll about x) of the hub against the local-vertical
+/// local-horizontal frame: x along the velocity, y against the orbit normal, z to the Earth. At t = 0 the start
+/// attitude is aligned with it; it turns at -n about its y.
 Vector3d lvlh_angles(const Vector3d& rotation, double n, double t) {
   const double angle = rotation.norm();
   const Matrix3d A = angle > 0 ? Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix() : Matrix3d::Identity();
@@ -177,7 +181,8 @@ std::string output_of_column(const std::string& column) {
   if (dot == std::string::npos) return column;
   const std::string last = column.substr(dot + 1);
   if (last == "x" || last == "y" || last == "z") return column.substr(0, dot);
-  if (last.size() > 1 && last[0] == 'q' && std::isdigit(static_cast<unsigned char>(last[1]))) return column.substr(0, dot) + ".q";
+  if (last.size() > 1 && last[0] == 'q' && std::isdigit(static_cast<unsigned char>(last[1])))
+    return column.substr(0, dot) + ".q";
   return column;
 }
 
@@ -188,7 +193,8 @@ bool is_wanted(const std::string& output, const std::vector<std::string>& wanted
 
 }  // namespace
 
-std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b, const std::vector<std::string>& wanted) {
+std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
+                                              const std::vector<std::string>& wanted) {
   const Eigen::Index rows = std::min(a.values.rows(), b.values.rows());
   std::vector<std::string> order;
   std::map<std::string, std::vector<std::pair<Eigen::Index, Eigen::Index>>> columns;
@@ -224,7 +230,8 @@ double largest(const std::vector<OutputDifference>& differences) {
   return r;
 }
 
-/// Adams keeps the energy of undamped motion at high order; with damping the equations are stiff (README of dynamics) and need BDF.
+/// Adams keeps the energy of undamped motion at high order; with damping the equations are stiff (README of dynamics)
+/// and need BDF.
 std::string chosen_method(const Scene& scene, const System& system) {
   if (scene.integrator != "auto") return scene.integrator;
   const bool damped = std::any_of(system.appendages().begin(), system.appendages().end(), [](const Appendage& a) {
@@ -266,7 +273,8 @@ Run run_once(const Scene& scene, int refine, const RunHooks& hooks) {
   return r;
 }
 
-/// Geometric stiffness of spin is left out of Ke: its size against it, (Omega / omega_1)^2 of the body's first mode, at worst over the run.
+/// Geometric stiffness of spin is left out of Ke: its size against it, (Omega / omega_1)^2 of the body's first mode, at
+/// worst over the run.
 double linearisation_estimate(const Run& run) {
   double worst = 0;
   for (size_t b = 0; b < run.bodies.size(); ++b) {
@@ -274,7 +282,8 @@ double linearisation_estimate(const Run& run) {
     if (body.n() == 0) continue;
     const double omega_1 = std::sqrt(body.Ke(0, 0) / body.Me(0, 0));
     double spin = 0;
-    const auto rate = std::find(run.outputs.names.begin(), run.outputs.names.end(), body.name + ".rate") - run.outputs.names.begin();
+    const auto rate =
+        std::find(run.outputs.names.begin(), run.outputs.names.end(), body.name + ".rate") - run.outputs.names.begin();
     for (Eigen::Index row = 0; row < run.outputs.values.rows(); ++row) {
       const double w = run.outputs.values.row(row).segment<3>(4).norm() + std::abs(run.outputs.values(row, rate));
       spin = std::max(spin, w);
@@ -296,20 +305,24 @@ Scene with_more_modes(Scene scene, int extra) {
   return scene;
 }
 
-/// Repeats the run ten times tighter until the difference is within the tolerance; the tighter run then takes its place. Returns the difference.
-/// `flown` is the scene of the run that was kept.
-double settle_time_error(const Scene& scene, Scene& flown, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
+/// Repeats the run ten times tighter until the difference is within the tolerance; the tighter run then takes its
+/// place. Returns the difference. `flown` is the scene of the run that was kept.
+double settle_time_error(const Scene& scene, Scene& flown, Run& run, const RunHooks& hooks,
+                         std::vector<std::string>& plan) {
   constexpr int most = 3;
   for (int i = 1;; ++i) {
     Scene tight = flown;
     tight.tolerance /= 10;
     Run finer = run_once(tight, 0, hooks);
     const double error = largest(compare_outputs(run.outputs, finer.outputs, scene.outputs));
-    if (error <= scene.tolerance || i == most || finer.motion.summary.interrupted || tight.tolerance < 1e-13) return error;
+    if (error <= scene.tolerance || i == most || finer.motion.summary.interrupted || tight.tolerance < 1e-13)
+      return error;
     run = std::move(finer);
     flown = tight;
-    plan.push_back(fmt::format("time integration: changed by {:.1e} at a tenth of the tolerance, so that run is the one kept (integrator "
-                               "tolerance {:.0e})", error, tight.tolerance));
+    plan.push_back(fmt::format(
+        "time integration: changed by {:.1e} at a tenth of the tolerance, so that run is the one kept (integrator "
+        "tolerance {:.0e})",
+        error, tight.tolerance));
   }
 }
 
@@ -338,11 +351,13 @@ void choose_modes(Scene& scene, const RunHooks& hooks, std::vector<std::string>&
   for (int n = 1;; ++n) {
     Scene more = scene;
     for (const size_t i : automatic) scene.bodies[i].modes = n, more.bodies[i].modes = n + 2;
-    const double error = largest(compare_outputs(run_once(scene, 0, hooks).outputs, run_once(more, 0, hooks).outputs, scene.outputs));
+    const double error =
+        largest(compare_outputs(run_once(scene, 0, hooks).outputs, run_once(more, 0, hooks).outputs, scene.outputs));
     if (error <= scene.tolerance || n == most) {
       for (const size_t i : automatic) scene.bodies[i].modes_auto = false;
-      plan.push_back(fmt::format("modes: {} per automatic body: two more change the outputs by {:.2e} ({} the tolerance {:.1e})", n,
-                                 error, error <= scene.tolerance ? "within" : "still above", scene.tolerance));
+      plan.push_back(
+          fmt::format("modes: {} per automatic body: two more change the outputs by {:.2e} ({} the tolerance {:.1e})",
+                      n, error, error <= scene.tolerance ? "within" : "still above", scene.tolerance));
       return;
     }
   }
@@ -357,18 +372,21 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
                                                                  b.geometry.order, p.dofs);
     plan.push_back(fmt::format("{}: {}; {} modes", b.name, model, p.body.n()));
     plan.push_back(b.damping.name == "none" ? fmt::format("{}: no structural damping", b.name)
-                                            : fmt::format("{}: structural damping '{}', value {:g}", b.name, b.damping.name,
-                                                          b.damping.value));
+                                            : fmt::format("{}: structural damping '{}', value {:g}", b.name,
+                                                          b.damping.name, b.damping.value));
   }
   for (const HingeScene& h : scene.hinges)
     plan.push_back(fmt::format("hinge {}: damping {:g} N m s/rad, stop {:g} N m/rad without damping of its own", h.body,
                                h.hinge.mechanism.damping, h.hinge.mechanism.stop_stiffness));
-  plan.push_back(fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
-                             run.motion.summary.method, scene.integrator == "auto" ? "by the damping of the scene" : "as asked", scene.tolerance));
+  plan.push_back(
+      fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
+                  run.motion.summary.method, scene.integrator == "auto" ? "by the damping of the scene" : "as asked",
+                  scene.tolerance));
   plan.emplace_back("geometric stiffness: left out, its size is error_budget.linearisation");
   if (scene.orbit)
-    plan.push_back(fmt::format("orbit: sets the LVLH frame (rate {:.6e} rad/s); gravity gradient left out, {:.1e} 1/s^2", scene.orbit->rate(),
-                               3 * std::pow(scene.orbit->rate(), 2)));
+    plan.push_back(
+        fmt::format("orbit: sets the LVLH frame (rate {:.6e} rad/s); gravity gradient left out, {:.1e} 1/s^2",
+                    scene.orbit->rate(), 3 * std::pow(scene.orbit->rate(), 2)));
 }
 
 }  // namespace
@@ -387,7 +405,8 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks) {
   constexpr long worth_repeating = 2'000'000;
   const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating;
   if (r.scene.error_budget && !repeat)
-    r.plan.push_back(fmt::format("error budget: not measured, its repeats would cost four times {} evaluations", run.motion.summary.rhs_evaluations));
+    r.plan.push_back(fmt::format("error budget: not measured, its repeats would cost four times {} evaluations",
+                                 run.motion.summary.rhs_evaluations));
   if (r.scene.error_budget && repeat && !run.motion.summary.interrupted) {
     const auto start = std::chrono::steady_clock::now();
     r.budget = measure_budget(r.scene, run, silent, r.plan);

@@ -46,10 +46,10 @@ struct RunResult {
   Trajectory trajectory;
   OutputTable outputs;
   ErrorBudget budget;
-  std::vector<std::string> plan;      // what was chosen and why, one line each
+  std::vector<std::string> plan;  // what was chosen and why, one line each
   std::vector<std::string> warnings;
   double prepare_seconds = 0;
-  double integrate_seconds = 0;       // of the run itself, without the repeats
+  double integrate_seconds = 0;  // of the run itself, without the repeats
   double budget_seconds = 0;
 };
 
@@ -71,12 +71,13 @@ RunResult run_scene(const Scene&, const RunHooks&);
 /// Columns of trajectory.csv.
 OutputTable output_table(const Scene&, const System&, const Trajectory&);
 
-/// Largest relative difference over the wanted outputs that both tables have (all when `wanted` is empty): for each output, a vector
-/// counting as one, max over time of |a - b| over max |b|.
+/// Largest relative difference over the wanted outputs that both tables have (all when `wanted` is empty): for each
+/// output, a vector counting as one, max over time of |a - b| over max |b|.
 struct OutputDifference {
   std::string name;
   double error = 0;
 };
-std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b, const std::vector<std::string>& wanted);
+std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
+                                              const std::vector<std::string>& wanted);
 
 }  // namespace flexboom

@@ -1,13 +1,13 @@
 #include "apps/version.hpp"
 
-#include <CLI/Version.hpp>
-#include <Eigen/Core>
 #include <Spectra/Util/Version.h>
 #include <cholmod.h>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <sundials/sundials_config.h>
 #include <toml++/impl/version.h>
+#include <CLI/Version.hpp>
+#include <Eigen/Core>
+#include <nlohmann/json.hpp>
 
 namespace flexboom {
 
@@ -19,15 +19,23 @@ std::string version_text() {
   line("Eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION), "MPL-2.0");
   line("CHOLMOD", fmt::format("{}.{}.{}", CHOLMOD_MAIN_VERSION, CHOLMOD_SUB_VERSION, CHOLMOD_SUBSUB_VERSION),
        "LGPL-2.1+ (Core, Cholesky), GPL-2.0+ (Supernodal, MatrixOps)");
+  // What CHOLMOD and ARPACK bring along; their versions are those of the system that runs the program.
+  line("AMD, COLAMD", "", "BSD-3-Clause (with CAMD, CCOLAMD)");
+  line("METIS", "", "Apache-2.0");
+  line("OpenBLAS", "", "BSD-3-Clause (or another BLAS and LAPACK)");
+  line("GNU runtime", "", "GPL-3.0+ with the runtime exception (libgomp, libgfortran)");
   line("ARPACK-NG", "3.8", "BSD-3-Clause");
-  line("Spectra", fmt::format("{}.{}.{}", SPECTRA_MAJOR_VERSION, SPECTRA_MINOR_VERSION, SPECTRA_PATCH_VERSION), "MPL-2.0");
+  line("Spectra", fmt::format("{}.{}.{}", SPECTRA_MAJOR_VERSION, SPECTRA_MINOR_VERSION, SPECTRA_PATCH_VERSION),
+       "MPL-2.0");
   line("SUNDIALS", SUNDIALS_VERSION, "BSD-3-Clause");
   line("CLI11", CLI11_VERSION, "BSD-3-Clause");
   line("toml++", fmt::format("{}.{}.{}", TOML_LIB_MAJOR, TOML_LIB_MINOR, TOML_LIB_PATCH), "MIT");
-  line("nlohmann-json", fmt::format("{}.{}.{}", NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR, NLOHMANN_JSON_VERSION_PATCH),
+  line("nlohmann-json",
+       fmt::format("{}.{}.{}", NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR, NLOHMANN_JSON_VERSION_PATCH),
        "MIT");
   line("fmt", fmt::format("{}.{}.{}", FMT_VERSION / 10000, FMT_VERSION / 100 % 100, FMT_VERSION % 100), "MIT");
-  t += "The source of flexboom is BSD-3-Clause. CHOLMOD's supernodal part is GPL: it makes this binary, as linked, GPL.\n";
+  t += "The source of flexboom is BSD-3-Clause. CHOLMOD's supernodal part is GPL: it makes this binary, as linked, "
+       "GPL.\n";
   return t;
 }
 

@@ -12,14 +12,16 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// Momenta of one body about its BRF origin, and its kinetic energy, all in BRF axes (FORMULATION 2, 3): straight from the invariants.
+/// Momenta of one body about its BRF origin, and its kinetic energy, all in BRF axes (FORMULATION 2, 3): straight from
+/// the invariants.
 struct BodyMotion {
   double kinetic = 0;
   double m = 0;
   Vector3d mc, momentum, angular_momentum;
 };
 
-BodyMotion body_motion(const ReducedBody& b, const Vector3d& v, const Vector3d& w, const VectorXd& q, const VectorXd& q_dot) {
+BodyMotion body_motion(const ReducedBody& b, const Vector3d& v, const Vector3d& w, const VectorXd& q,
+                       const VectorXd& q_dot) {
   Matrix3d J = b.J0;
   Matrix3Xd Cr = b.Cr0;
   for (int k = 0; k < b.n(); ++k) {

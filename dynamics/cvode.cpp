@@ -36,8 +36,8 @@ struct ContextHandle {
 
 void quiet(int, const char*, const char*, char*, void*) noexcept {}
 
-/// CVODE on one System. The matrix handed to CVODE is a token: I - gamma J lives in the Workspace in its condensed form, which costs a
-/// factorisation of u x u instead of y x y.
+/// CVODE on one System. The matrix handed to CVODE is a token: I - gamma J lives in the Workspace in its condensed
+/// form, which costs a factorisation of u x u instead of y x y.
 class CvodeStepper final : public Stepper {
  public:
   CvodeStepper(const System& system, const ErrorScale& scale, int method)
@@ -70,7 +70,8 @@ class CvodeStepper final : public Stepper {
   CvodeStepper(const CvodeStepper&) = delete;
   CvodeStepper& operator=(const CvodeStepper&) = delete;
 
-  void restart(double t, const Eigen::VectorXd& y, std::span<const char> contact, std::span<const char> armed) override {
+  void restart(double t, const Eigen::VectorXd& y, std::span<const char> contact,
+               std::span<const char> armed) override {
     std::copy(contact.begin(), contact.end(), contact_.begin());
     std::copy(armed.begin(), armed.end(), armed_.begin());
     Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(y_.get()), y.size()) = y;
@@ -168,7 +169,8 @@ class CvodeStepper final : public Stepper {
       CVodeGetLastStep(cvode_, &h);
     }
     std::unique_ptr<char, decltype(&std::free)> name(CVodeGetReturnFlagName(flag), &std::free);
-    throw NumericalError(fmt::format("CVODE: {} returned {} at t = {:.9g} s, last step {:.3g} s", function, name.get(), t, h));
+    throw NumericalError(
+        fmt::format("CVODE: {} returned {} at t = {:.9g} s, last step {:.3g} s", function, name.get(), t, h));
   }
 
   void add_counts(StepCounts& c) const {

@@ -1,70 +1,46 @@
 #pragma once
 
-#include <array>
 #include <cmath>
 
 namespace flexboom {
 
-/// A number with N directional derivatives (forward-mode differentiation): f(Dual) carries f and df exactly, without differences.
-/// The equations of motion are written once for a scalar T; T = double gives their value, T = Dual<N> N columns of their Jacobian.
+/// A number with N directional derivatives (forward-mode differentiation): f(Dual) carries f and df exactly, without
+/// differences. The equations of motion are written once for a scalar T; T = double gives their value, T = Dual<N> N
+/// columns of their Jacobian. N is a power of two: the derivatives are one vector of the compiler, so that an operation
+/// on all of them is one instruction where the machine has registers that wide.
 template <int N>
 struct Dual {
+  using Lanes __attribute__((vector_size(N * sizeof(double)))) = double;
+
   double v = 0;
-  std::array<double, N> d{};
+  Lanes d = {};
 
   Dual() = default;
   Dual(double value) : v(value) {}  // NOLINT(google-explicit-constructor): a constant is a Dual without derivatives
+  Dual(double value, const Lanes& derivatives) : v(value), d(derivatives) {}
 
-  Dual& operator+=(const Dual& b) {
-    v += b.v;
-    for (int i = 0; i < N; ++i) d[i] += b.d[i];
-    return *this;
-  }
-  Dual& operator-=(const Dual& b) {
-    v -= b.v;
-    for (int i = 0; i < N; ++i) d[i] -= b.d[i];
-    return *this;
-  }
-  friend Dual operator+(Dual a, const Dual& b) { return a += b; }
-  friend Dual operator-(Dual a, const Dual& b) { return a -= b; }
-  friend Dual operator-(Dual a) {
-    a.v = -a.v;
-    for (int i = 0; i < N; ++i) a.d[i] = -a.d[i];
-    return a;
-  }
-  friend Dual operator*(const Dual& a, const Dual& b) {
-    Dual r;
-    r.v = a.v * b.v;
-    for (int i = 0; i < N; ++i) r.d[i] = a.d[i] * b.v + a.v * b.d[i];
-    return r;
-  }
-  friend Dual operator*(double a, Dual b) {
-    b.v *= a;
-    for (int i = 0; i < N; ++i) b.d[i] *= a;
-    return b;
-  }
+  Dual& operator+=(const Dual& b) { return *this = *this + b; }
+  Dual& operator-=(const Dual& b) { return *this = *this - b; }
+  friend Dual operator+(const Dual& a, const Dual& b) { return {a.v + b.v, a.d + b.d}; }
+  friend Dual operator-(const Dual& a, const Dual& b) { return {a.v - b.v, a.d - b.d}; }
+  friend Dual operator-(const Dual& a) { return {-a.v, -a.d}; }
+  friend Dual operator*(const Dual& a, const Dual& b) { return {a.v * b.v, a.d * b.v + a.v * b.d}; }
+  friend Dual operator*(double a, const Dual& b) { return {a * b.v, a * b.d}; }
   friend Dual operator*(const Dual& a, double b) { return b * a; }
   friend Dual operator/(const Dual& a, const Dual& b) {
-    const double inverse = 1 / b.v;
-    Dual r;
-    r.v = a.v * inverse;
-    for (int i = 0; i < N; ++i) r.d[i] = (a.d[i] - r.v * b.d[i]) * inverse;
-    return r;
+    const double inverse = 1 / b.v, ratio = a.v * inverse;
+    return {ratio, (a.d - ratio * b.d) * inverse};
   }
 };
 
 template <int N>
 Dual<N> sin(const Dual<N>& a) {
-  Dual<N> r = std::cos(a.v) * a;
-  r.v = std::sin(a.v);
-  return r;
+  return {std::sin(a.v), std::cos(a.v) * a.d};
 }
 
 template <int N>
 Dual<N> cos(const Dual<N>& a) {
-  Dual<N> r = -std::sin(a.v) * a;
-  r.v = std::cos(a.v);
-  return r;
+  return {std::cos(a.v), -std::sin(a.v) * a.d};
 }
 
 }  // namespace flexboom

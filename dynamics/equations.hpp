@@ -1,7 +1,7 @@
 #pragma once
 
-// The equations of motion of a hub with hinged flexible bodies, written once for a scalar T (README, "Equations of motion").
-// Internal to `dynamics`.
+// The equations of motion of a hub with hinged flexible bodies, written once for a scalar T (README, "Equations of
+// motion"). Internal to `dynamics`.
 
 #include "dynamics/dual.hpp"
 #include "dynamics/spatial.hpp"
@@ -17,8 +17,8 @@ using spatial::Mat3;
 using spatial::Sym3;
 using spatial::Vec3;
 
-/// One non-zero of J1 (component: xx, yy, zz, xy, yz, zx), J2 (the same) or Cr1 (component: x, y, z). A straight boom that bends in one plane
-/// has a handful, a general body n^2 times six: the loops run over what the body has.
+/// One non-zero of J1 (component: xx, yy, zz, xy, yz, zx), J2 (the same) or Cr1 (component: x, y, z). A straight boom
+/// that bends in one plane has a handful, a general body n^2 times six: the loops run over what the body has.
 struct Term {
   int k = 0, l = 0, component = 0;
   double value = 0;
@@ -41,12 +41,12 @@ struct Body {
   size_t row_begin(size_t k) const { return diagonal ? k : 0; }
   size_t row_end(size_t k) const { return diagonal ? k + 1 : static_cast<size_t>(n); }
 
-  Vec3<double> d;                     // hinge point, hub axes
-  Mat3<double> B;                     // columns stowed, outward, stowed x outward: boom axes at Theta = 0 -> hub axes
+  Vec3<double> d;  // hinge point, hub axes
+  Mat3<double> B;  // columns stowed, outward, stowed x outward: boom axes at Theta = 0 -> hub axes
   double cos_threshold = 0, sin_threshold = 0;
   double stiffness = 0, preload = 0;  // spring torque = preload - stiffness Delta
   double damping = 0, stop_stiffness = 0;
-  int at = 0;                         // first entry in p
+  int at = 0;  // first entry in p
 };
 
 struct Model {
@@ -60,11 +60,11 @@ struct Model {
 /// Quantities of one body that the second sweep needs again.
 template <class T>
 struct BodyScratch {
-  Mat3<T> A;                   // boom -> hub axes
-  std::vector<Vec3<T>> Cr;     // Cr(q), n
-  std::vector<Vec3<T>> Gw;     // Me^-1 Cr^T, n
-  std::vector<T> b, g;         // modal force and Me^-1 of it, n
-  Vec3<T> t0, w0;              // hinge row after elimination of q
+  Mat3<T> A;                // boom -> hub axes
+  std::vector<Vec3<T>> Cr;  // Cr(q), n
+  std::vector<Vec3<T>> Gw;  // Me^-1 Cr^T, n
+  std::vector<T> b, g;      // modal force and Me^-1 of it, n
+  Vec3<T> t0, w0;           // hinge row after elimination of q
   T b0{}, inverse_J_left{};
 };
 
@@ -83,13 +83,37 @@ struct Scratch {
   }
 };
 
-/// Mass matrix (symmetric, in blocks of translation and rotation) and force of the hub with everything condensed to it, hub axes.
+/// Mass matrix (symmetric, in blocks of translation and rotation) and force of the hub with everything condensed to it,
+/// hub axes.
 template <class T>
 struct HubSystem {
   Sym3<T> tt, ww;
   Mat3<T> tw;
   Vec3<T> ft, fw;
+
+  HubSystem& operator+=(const HubSystem& b) {
+    tt += b.tt, ww += b.ww, ft += b.ft, fw += b.fw;
+    for (size_t i = 0; i < 3; ++i) tw.row[i] += b.tw.row[i];
+    return *this;
+  }
 };
+
+/// A constant as a number with derivatives.
+template <class T>
+Vec3<T> lift(const Vec3<double>& a) {
+  return {T(a.x), T(a.y), T(a.z)};
+}
+template <class T>
+HubSystem<T> lift(const HubSystem<double>& h) {
+  const auto symmetric = [](const Sym3<double>& a) {
+    return Sym3<T>{T(a.xx), T(a.yy), T(a.zz), T(a.xy), T(a.yz), T(a.zx)};
+  };
+  return {symmetric(h.tt),
+          symmetric(h.ww),
+          {{lift<T>(h.tw.row[0]), lift<T>(h.tw.row[1]), lift<T>(h.tw.row[2])}},
+          lift<T>(h.ft),
+          lift<T>(h.fw)};
+}
 
 /// A (v) A^T of a symmetric matrix.
 template <class T>
@@ -232,8 +256,8 @@ void condense(const Body& body, const Vec3<T>& w_hub, const T* p, const T* u, bo
     s.b[k] -= dot(body.Ct[k], a_bias) + dot(s.Cr[k], alpha_bias);
   }
   Vec3<T> ft = -(cross(w, cross(w, inertia.mc) + 2.0 * Ct_rate) + body.m * a_bias + cross(alpha_bias, inertia.mc));
-  Vec3<T> fw = -(cross(w, inertia.J * w + Cr_rate) + inertia.J_dot * w + cross(inertia.mc, a_bias) +
-                 inertia.J * alpha_bias);
+  Vec3<T> fw =
+      -(cross(w, inertia.J * w + Cr_rate) + inertia.J_dot * w + cross(inertia.mc, a_bias) + inertia.J * alpha_bias);
 
   // Eliminate q_ddot, then Delta_ddot.
   s.t0 = {-inertia.mc.y, inertia.mc.x, T(0.0)};
@@ -304,11 +328,14 @@ void condense(const Body& body, const Vec3<T>& w_hub, const T* p, const T* u, bo
                     left.row[0].y + right.row[1].x, left.row[1].z + right.row[2].y, left.row[2].x + right.row[0].z};
 }
 
-/// Solves the 6 x 6 system of the hub by two 3 x 3 Cholesky factorisations in blocks (LDL^T of the whole, unrolled by a loop).
+/// Solves the 6 x 6 system of the hub by two 3 x 3 Cholesky factorisations in blocks (LDL^T of the whole, unrolled by a
+/// loop).
 template <class T>
 void solve_hub(const HubSystem<T>& h, Vec3<T>& a, Vec3<T>& alpha) {
   const Mat3<T>& c = h.tw;
-  T M[6][6] = {{h.tt.xx}, {h.tt.xy, h.tt.yy}, {h.tt.zx, h.tt.yz, h.tt.zz},
+  T M[6][6] = {{h.tt.xx},
+               {h.tt.xy, h.tt.yy},
+               {h.tt.zx, h.tt.yz, h.tt.zz},
                {c.row[0].x, c.row[1].x, c.row[2].x, h.ww.xx},
                {c.row[0].y, c.row[1].y, c.row[2].y, h.ww.xy, h.ww.yy},
                {c.row[0].z, c.row[1].z, c.row[2].z, h.ww.zx, h.ww.yz, h.ww.zz}};
@@ -330,51 +357,53 @@ void solve_hub(const HubSystem<T>& h, Vec3<T>& a, Vec3<T>& alpha) {
   alpha = {x[3], x[4], x[5]};
 }
 
-/// u_dot and the acceleration of the hub's origin in hub axes, from p = (Delta, q)... and u = (omega, Delta_dot, q_dot...).
+/// The hub alone, before any body is added: mass matrix, and force at angular velocity w.
 template <class T>
-void accelerations(const Model& model, const T* p, const T* u, std::span<const char> contact, Scratch<T>& scratch, T* u_dot,
-                   Vec3<T>& a_hub) {
-  HubSystem<T> hub{};
-  Vec3<T> w_hub{};
+HubSystem<T> bare_hub(const Model& model, const Vec3<T>& w) {
+  const Vec3<double>& c = model.hub_mc;
+  const Sym3<double>& J = model.hub_J;
+  const T zero(0.0);
+  HubSystem<T> hub;
+  hub.tt = {T(model.hub_m), T(model.hub_m), T(model.hub_m), zero, zero, zero};
+  hub.tw = {{Vec3<T>{zero, T(c.z), T(-c.y)}, Vec3<T>{T(-c.z), zero, T(c.x)}, Vec3<T>{T(c.y), T(-c.x), zero}}};
+  hub.ww = {T(J.xx), T(J.yy), T(J.zz), T(J.xy), T(J.yz), T(J.zx)};
+  hub.ft = -cross(w, cross(w, c));
+  hub.fw = -cross(w, J * w);
+  return hub;
+}
+
+/// Second sweep: Delta_ddot and q_ddot of one body from the accelerations of the hub. S may be double where T is Dual:
+/// a body whose own state is held constant.
+template <class S, class T>
+void release(const Body& body, const BodyScratch<S>& s, const Vec3<T>& a_hub, const Vec3<T>& alpha_hub, T* out) {
+  const Vec3<T> a = transposed_product(s.A, a_hub - cross(body.d, alpha_hub));
+  Vec3<T> alpha = transposed_product(s.A, alpha_hub);
+  out[0] = (s.b0 - (dot(s.t0, a) + dot(s.w0, alpha))) * s.inverse_J_left;
+  alpha.z += out[0];
+  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k)
+    out[1 + k] = s.g[k] - (dot(body.Gt[k], a) + dot(s.Gw[k], alpha));
+}
+
+/// u_dot and the acceleration of the hub's origin in hub axes, from p = (Delta, q)... and u = (omega, Delta_dot,
+/// q_dot...).
+template <class T>
+void accelerations(const Model& model, const T* p, const T* u, std::span<const char> contact, Scratch<T>& scratch,
+                   T* u_dot, Vec3<T>& a_hub) {
   const int base = model.fixed_hub ? 0 : 3;
-  if (!model.fixed_hub) {
-    w_hub = {u[0], u[1], u[2]};
-    hub.tt = {T(model.hub_m), T(model.hub_m), T(model.hub_m), T(0.0), T(0.0), T(0.0)};
-    const Vec3<double>& c = model.hub_mc;
-    hub.tw = {{Vec3<T>{T(0.0), T(c.z), T(-c.y)}, Vec3<T>{T(-c.z), T(0.0), T(c.x)}, Vec3<T>{T(c.y), T(-c.x), T(0.0)}}};
-    const Sym3<double>& J = model.hub_J;
-    hub.ww = {T(J.xx), T(J.yy), T(J.zz), T(J.xy), T(J.yz), T(J.zx)};
-    hub.ft = -cross(w_hub, cross(w_hub, c));
-    hub.fw = -cross(w_hub, J * w_hub);
-  }
+  const Vec3<T> w_hub = model.fixed_hub ? Vec3<T>{} : Vec3<T>{u[0], u[1], u[2]};
+  HubSystem<T> hub = bare_hub(model, w_hub);
   for (size_t i = 0; i < model.bodies.size(); ++i) {
     const Body& body = model.bodies[i];
     condense(body, w_hub, p + body.at, u + base + body.at, contact[i] != 0, scratch.bodies[i], model.fixed_hub, hub);
   }
-
-  Vec3<T> alpha_hub{};
   a_hub = Vec3<T>{};
+  Vec3<T> alpha_hub{};
   if (!model.fixed_hub) {
     solve_hub(hub, a_hub, alpha_hub);
     u_dot[0] = alpha_hub.x, u_dot[1] = alpha_hub.y, u_dot[2] = alpha_hub.z;
   }
-  for (size_t i = 0; i < model.bodies.size(); ++i) {
-    const Body& body = model.bodies[i];
-    BodyScratch<T>& s = scratch.bodies[i];
-    T* out = u_dot + base + body.at;
-    T hinge = s.b0;
-    Vec3<T> a{}, alpha{};
-    if (!model.fixed_hub) {
-      a = transposed_product(s.A, a_hub - cross(body.d, alpha_hub));
-      alpha = transposed_product(s.A, alpha_hub);
-      hinge -= dot(s.t0, a) + dot(s.w0, alpha);
-    }
-    out[0] = hinge * s.inverse_J_left;
-    alpha.z += out[0];
-    for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) {
-      out[1 + k] = s.g[k] - dot(body.Gt[k], a) - dot(s.Gw[k], alpha);
-    }
-  }
+  for (size_t i = 0; i < model.bodies.size(); ++i)
+    release(model.bodies[i], scratch.bodies[i], a_hub, alpha_hub, u_dot + base + model.bodies[i].at);
 }
 
 }  // namespace flexboom::equations

@@ -10,6 +10,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 namespace flexboom {
 
@@ -20,8 +21,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr std::array<IntegratorMethod, 2> methods = {{
-    {"bdf", "CVODE backward differentiation, order 1-5, Newton with the exact Jacobian", make_cvode_bdf},
-    {"adams", "CVODE Adams-Moulton, order 1-12, Newton with the exact Jacobian", make_cvode_adams},
+    {"bdf", "CVODE backward differentiation, order 1-5, Newton with the exact Jacobian", 0.005, make_cvode_bdf},
+    {"adams", "CVODE Adams-Moulton, order 1-12, Newton with the exact Jacobian", 0.001, make_cvode_adams},
 }};
 
 const IntegratorMethod& method_named(const std::string& name) {
@@ -32,17 +33,14 @@ const IntegratorMethod& method_named(const std::string& name) {
   throw InputError(fmt::format("integrator '{}' is not known; there are:{}", name, known));
 }
 
-/// The local error asked of each step for an error over the whole run near the tolerance wanted. Errors of undamped motion grow with its
-/// periods, so this is a start, not a promise: a run's error budget measures what was reached.
-constexpr double local_share = 0.005;
-
-/// Sizes that each state's error is measured against: the largest value so far of the group it belongs to, and never less than a
-/// small part of what the energy at the start could make of it (so that a state that starts at zero has a size).
+/// Sizes that each state's error is measured against: the largest value so far of the group it belongs to, and never
+/// less than a small part of what the energy at the start could make of it (so that a state that starts at zero has a
+/// size).
 class Scales {
  public:
   Scales(const System& system, const VectorXd& y0, double tolerance, bool rescale)
       : system_(system), rescale_(rescale), start_attitude_(1, 0, 0, 0) {
-    error_.tolerance = local_share * tolerance;
+    error_.tolerance = tolerance;
     error_.scale = VectorXd::Zero(y0.size());
     largest_ = VectorXd::Zero(y0.size());
     if (!system.fixed_hub()) start_attitude_ = y0.segment<4>(system.layout().attitude());
@@ -149,7 +147,8 @@ struct Contacts {
 /// Stops at the start: closed beyond the threshold; exactly on it, by where the hinge is going.
 Contacts contacts_at_start(const System& system, const VectorXd& y) {
   const size_t n = system.appendages().size();
-  Contacts c{std::vector<char>(n, 0), std::vector<char>(n, 0), std::vector<double>(n, 0.0), std::vector<double>(n, -1.0)};
+  Contacts c{std::vector<char>(n, 0), std::vector<char>(n, 0), std::vector<double>(n, 0.0),
+             std::vector<double>(n, -1.0)};
   for (size_t i = 0; i < n; ++i) {
     const double gap = system.gap(y.data(), static_cast<int>(i)), rate = system.gap_rate(y.data(), static_cast<int>(i));
     c.armed[i] = system.appendages()[i].hinge.mechanism.stop_stiffness > 0;
@@ -169,12 +168,12 @@ void check_options(const IntegratorOptions& o) {
 /// One run: the event loop around a method.
 class Flight {
  public:
-  Flight(const System& system, const VectorXd& y0, const IntegratorOptions& options)
+  Flight(const System& system, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method)
       : system_(system),
         options_(options),
         settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
-        scales_(system, y0, options.tolerance, options.rescale_at_events),
-        stepper_(method_named(options.method).make(system, scales_.error())),
+        scales_(system, y0, method.local_share * options.tolerance, options.rescale_at_events),
+        stepper_(method.make(system, scales_.error())),
         contacts_(contacts_at_start(system, y0)),
         y_(y0),
         sample_(y0),
@@ -199,7 +198,8 @@ class Flight {
   void advance() {
     stepper_->step(options_.duration, t_, y_, crossed_);
     if (++steps_ > options_.max_steps)
-      throw NumericalError(fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t_, options_.duration));
+      throw NumericalError(
+          fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t_, options_.duration));
     if (!y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", t_));
     write_outputs();
     scales_.observe(y_);
@@ -333,7 +333,7 @@ std::span<const IntegratorMethod> integrator_methods() { return methods; }
 Trajectory integrate(const System& system, const VectorXd& y0, const IntegratorOptions& options) {
   check_options(options);
   require(y0.size() == system.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
-  return Flight(system, y0, options).fly();
+  return Flight(system, y0, options, method_named(options.method)).fly();
 }
 
 }  // namespace flexboom

@@ -19,14 +19,14 @@ struct IntegratorOptions {
   double tolerance = 1e-6;    // relative error wanted in every output (max over time / max of the output)
   double duration = 10;       // [s]
   double output_step = 0.01;  // [s]
-  /// A hinge whose rate at the stop falls below this fraction of its largest rate so far has settled: its crossings are no longer
-  /// located (its stop counts as open) until the rate doubles. Negative: tolerance / 100. Zero: never.
+  /// A hinge whose rate at the stop falls below this fraction of its largest rate so far has settled: its crossings are
+  /// no longer located (its stop counts as open) until the rate doubles. Negative: tolerance / 100. Zero: never.
   double settle = -1;
-  /// Measure the hinge's error against its motion since the last event instead of its largest motion: late, tiny contacts keep
-  /// their relative accuracy. Costs steps.
+  /// Measure the hinge's error against its motion since the last event instead of its largest motion: late, tiny
+  /// contacts keep their relative accuracy. Costs steps.
   bool rescale_at_events = false;
   long max_steps = 200'000'000;
-  const std::atomic<bool>* interrupt = nullptr;            // set from outside: stop and return what there is
+  const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
   std::function<void(double time, double duration)> progress;  // called now and then
 };
 
@@ -65,7 +65,8 @@ struct Trajectory {
 };
 
 /// Flies the system from y0 at t = 0.
-/// @throws InputError for an unknown method (listing those that exist) or bad options; NumericalError when the method fails.
+/// @throws InputError for an unknown method (listing those that exist) or bad options; NumericalError when the method
+/// fails.
 Trajectory integrate(const System&, const Eigen::VectorXd& y0, const IntegratorOptions&);
 
 /// What a method needs to weigh an error: |error_i| is measured in units of tolerance * scale_i.
@@ -84,8 +85,10 @@ class Stepper {
  public:
   virtual ~Stepper() = default;
   /// Starts again at (t, y) with these stops closed. Crossings of hinges with armed[i] != 0 end a step.
-  virtual void restart(double t, const Eigen::VectorXd& y, std::span<const char> contact, std::span<const char> armed) = 0;
-  /// One step, not beyond t_end. Fills t and y, and crossed[i] with +1 (gap rises through zero), -1 or 0. When something was crossed, (t, y) is there.
+  virtual void restart(double t, const Eigen::VectorXd& y, std::span<const char> contact,
+                       std::span<const char> armed) = 0;
+  /// One step, not beyond t_end. Fills t and y, and crossed[i] with +1 (gap rises through zero), -1 or 0. When
+  /// something was crossed, (t, y) is there.
   virtual void step(double t_end, double& t, Eigen::VectorXd& y, std::span<int> crossed) = 0;
   /// y within the last step.
   virtual void interpolate(double t, Eigen::VectorXd& y) = 0;
@@ -95,6 +98,9 @@ class Stepper {
 struct IntegratorMethod {
   std::string_view name;
   std::string_view what;
+  /// Part of the tolerance wanted over a whole run that each step is asked for. Errors of undamped motion grow with its
+  /// periods, so this is a start, not a promise: a run's error budget measures what was reached.
+  double local_share;
   std::unique_ptr<Stepper> (*make)(const System&, const ErrorScale&);
 };
 

@@ -6,8 +6,8 @@
 
 namespace flexboom::spatial {
 
-// Three-vectors and 3 x 3 matrices over any scalar (double or Dual), for the inner loop only; everything else uses Eigen.
-// Constants stay double, so a product with a constant costs no derivative arithmetic it does not need.
+// Three-vectors and 3 x 3 matrices over any scalar (double or Dual), for the inner loop only; everything else uses
+// Eigen. Constants stay double, so a product with a constant costs no derivative arithmetic it does not need.
 
 template <class T>
 struct Vec3 {

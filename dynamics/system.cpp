@@ -4,13 +4,15 @@
 #include "dynamics/workspace.hpp"
 #include "fem/check.hpp"
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
+#include <Eigen/Cholesky>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
-// The two inner loops are compiled twice, for any x86-64 and for one with AVX2 and FMA; the loader picks. Everything they call is inlined, so that
-// it is compiled twice too.
+// The two inner loops are compiled twice, for any x86-64 and for one with AVX2 and FMA; the loader picks. Everything
+// they call is inlined, so that it is compiled twice too.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
 #define FLEXBOOM_INNER_LOOP __attribute__((target_clones("arch=haswell", "default"), flatten))
 #else
@@ -100,7 +102,8 @@ void pack_invariants(const ReducedBody& b, equations::Body& r) {
   r.Ct = pack_columns(b.Ct, to_vec);
   r.Cr0 = pack_columns(b.Cr0, to_vec);
   r.J1 = non_zeros(r.n, 1, 6, [&](size_t k, int, int c) { return symmetric_entry(b.J1[k], c); });
-  r.J2 = non_zeros(r.n, r.n, 6, [&](size_t k, int l, int c) { return symmetric_entry(b.J2[k][static_cast<size_t>(l)], c); });
+  r.J2 = non_zeros(r.n, r.n, 6,
+                   [&](size_t k, int l, int c) { return symmetric_entry(b.J2[k][static_cast<size_t>(l)], c); });
   r.Cr1 = non_zeros(r.n, r.n, 3, [&](size_t k, int l, int c) { return b.Cr1[k](c, l); });
   r.Ke = row_major(b.Ke);
   r.De = row_major(b.De);
@@ -292,29 +295,97 @@ void System::derivative(const double* y, std::span<const char> contact, Workspac
   y_dot[l.dissipated()] = dissipated_power(impl_->model, u, l.base);
 }
 
+namespace {
+
+/// Writes the derivatives of dual_out and a_hub by the inputs at `columns`, one lane each.
+void store_columns(Workspace& w, const Vec3<Workspace::D>& a_hub, std::span<const int> columns) {
+  for (size_t lane = 0; lane < columns.size(); ++lane) {
+    const int column = columns[lane], i = static_cast<int>(lane);
+    for (Eigen::Index r = 0; r < w.dudot.rows(); ++r) w.dudot(r, column) = w.dual_out[static_cast<size_t>(r)].d[i];
+    w.dahub.col(column) << a_hub.x.d[i], a_hub.y.d[i], a_hub.z.d[i];
+  }
+}
+
+/// Columns of one body's own Delta, q and their rates: only that body is differentiated, the others' parts of the hub
+/// system are constants.
+void body_columns(const equations::Model& model, const Layout& l, size_t i, std::span<const char> contact,
+                  Workspace& w) {
+  using D = Workspace::D;
+  const equations::Body& body = model.bodies[i];
+  const Vec3<double> w_hub = model.fixed_hub ? Vec3<double>{} : Vec3<double>{w.y[l.p], w.y[l.p + 1], w.y[l.p + 2]};
+  equations::HubSystem<double> others = equations::bare_hub(model, w_hub);
+  for (size_t j = 0; j < model.bodies.size(); ++j)
+    if (j != i) others += w.parts[j];
+  const int size = 1 + body.n;
+  std::array<int, Workspace::lanes> columns{};
+  for (int first = 0; first < 2 * size; first += Workspace::lanes) {
+    const int count = std::min(Workspace::lanes, 2 * size - first);
+    D* p = w.dual_in.data();
+    D* u = p + size;
+    for (int k = 0; k < size; ++k) {
+      p[k] = w.y[body.at + k];
+      u[k] = w.y[l.p + l.base + body.at + k];
+    }
+    for (int lane = 0; lane < count; ++lane) {
+      const int input = first + lane;
+      p[input].d[lane] = 1;
+      columns[static_cast<size_t>(lane)] = input < size ? body.at + input : l.p + l.base + body.at + input - size;
+    }
+    equations::HubSystem<D> hub = equations::lift<D>(others);
+    equations::condense(body, equations::lift<D>(w_hub), p, u, contact[i] != 0, w.dual_scratch.bodies[i],
+                        model.fixed_hub, hub);
+    Vec3<D> a{}, alpha{};
+    if (!model.fixed_hub) {
+      equations::solve_hub(hub, a, alpha);
+      w.dual_out[0] = alpha.x, w.dual_out[1] = alpha.y, w.dual_out[2] = alpha.z;
+    }
+    for (size_t j = 0; j < model.bodies.size(); ++j) {
+      D* out = w.dual_out.data() + l.base + model.bodies[j].at;
+      if (j == i)
+        equations::release(model.bodies[j], w.dual_scratch.bodies[j], a, alpha, out);
+      else
+        equations::release(model.bodies[j], w.scratch.bodies[j], a, alpha, out);
+    }
+    store_columns(w, a, std::span(columns).first(static_cast<size_t>(count)));
+  }
+}
+
+/// Columns of the hub's angular velocity, which every body feels.
+void hub_columns(const equations::Model& model, const Layout& l, std::span<const char> contact, Workspace& w) {
+  for (int i = 0; i < l.p + l.u; ++i) w.dual_in[static_cast<size_t>(i)] = w.y[i];
+  std::array<int, 3> columns{};
+  for (int lane = 0; lane < 3; ++lane) {
+    columns[static_cast<size_t>(lane)] = l.p + lane;
+    w.dual_in[static_cast<size_t>(l.p + lane)].d[lane] = 1;
+  }
+  Vec3<Workspace::D> a_hub;
+  equations::accelerations(model, w.dual_in.data(), w.dual_in.data() + l.p, contact, w.dual_scratch, w.dual_out.data(),
+                           a_hub);
+  store_columns(w, a_hub, columns);
+  w.a_hub << a_hub.x.v, a_hub.y.v, a_hub.z.v;
+}
+
+}  // namespace
+
 FLEXBOOM_INNER_LOOP
 void System::jacobian(const double* y, std::span<const char> contact, Workspace& w) const {
   const Layout& l = impl_->layout;
-  const int inputs = l.p + l.u;
-  for (int i = 0; i < inputs; ++i) w.dual_in[static_cast<size_t>(i)] = Workspace::D(y[i]);
-  for (int first = 0; first < inputs; first += Workspace::lanes) {
-    const int count = std::min(Workspace::lanes, inputs - first);
-    for (int i = 0; i < count; ++i) w.dual_in[static_cast<size_t>(first + i)].d[static_cast<size_t>(i)] = 1;
-    Vec3<Workspace::D> a_hub;
-    equations::accelerations(impl_->model, w.dual_in.data(), w.dual_in.data() + l.p, contact, w.dual_scratch,
-                             w.dual_out.data(), a_hub);
-    for (int i = 0; i < count; ++i) {
-      const auto lane = static_cast<size_t>(i);
-      for (int r = 0; r < l.u; ++r) w.dudot(r, first + i) = w.dual_out[static_cast<size_t>(r)].d[lane];
-      w.dahub.col(first + i) << a_hub.x.d[lane], a_hub.y.d[lane], a_hub.z.d[lane];
-      w.dual_in[static_cast<size_t>(first + i)].d[lane] = 0;
-    }
-    w.a_hub << a_hub.x.v, a_hub.y.v, a_hub.z.v;
-  }
+  const equations::Model& model = impl_->model;
   w.y = Eigen::Map<const VectorXd>(y, l.size);
+  const double* u = y + l.u_begin();
+  const Vec3<double> w_hub = model.fixed_hub ? Vec3<double>{} : Vec3<double>{u[0], u[1], u[2]};
+  for (size_t i = 0; i < model.bodies.size(); ++i) {
+    const equations::Body& body = model.bodies[i];
+    w.parts[i] = {};
+    equations::condense(body, w_hub, y + body.at, u + l.base + body.at, contact[i] != 0, w.scratch.bodies[i],
+                        model.fixed_hub, w.parts[i]);
+  }
+  for (size_t i = 0; i < model.bodies.size(); ++i) body_columns(model, l, i, contact, w);
+  if (!model.fixed_hub) hub_columns(model, l, contact, w);
 }
 
-// p_dot = E u with E picking the rates, so (I - gamma J) condenses to u: (I - gamma A_u - gamma^2 A_p E) du = r_u + gamma A_p r_p.
+// p_dot = E u with E picking the rates, so (I - gamma J) condenses to u: (I - gamma A_u - gamma^2 A_p E) du = r_u +
+// gamma A_p r_p.
 void System::factorise_newton(double gamma, Workspace& w) const {
   const Layout& l = impl_->layout;
   w.gamma = gamma;
@@ -370,7 +441,7 @@ void System::solve_newton(const double* b, Workspace& w, double* x) const {
     const Vector4d dq = (rhs + gamma * Eigen::Map<const Vector4d>(rate)) / (1 + 0.25 * gamma * gamma * w2);
     const Vector3d da = w.dahub.lazyProduct(w.delta);
     const Vector3d dv = r.segment<3>(l.velocity()) + gamma * (to_inertial(y + l.attitude(), da) +
-                                                             rotated_vector_slope(y + l.attitude(), w.a_hub) * dq);
+                                                              rotated_vector_slope(y + l.attitude(), w.a_hub) * dq);
     const Vector3d dr = r.segment<3>(l.position()) + gamma * dv;
     Eigen::Map<Vector4d>(x + l.attitude()) = dq;
     Eigen::Map<Vector3d>(x + l.velocity()) = dv;
@@ -401,8 +472,7 @@ MatrixXd System::dense_jacobian(const Workspace& w) const {
     const Vector4d e = Vector4d::Unit(i);
     quaternion_rate(e.data(), y + l.u_begin(), &J(l.attitude(), l.attitude() + i));
   }
-  for (int i = 0; i < l.p + l.u; ++i)
-    J.block<3, 1>(l.velocity(), i) = to_inertial(y + l.attitude(), w.dahub.col(i));
+  for (int i = 0; i < l.p + l.u; ++i) J.block<3, 1>(l.velocity(), i) = to_inertial(y + l.attitude(), w.dahub.col(i));
   J.block<3, 4>(l.velocity(), l.attitude()) = rotated_vector_slope(y + l.attitude(), w.a_hub);
   return J;
 }

@@ -19,33 +19,34 @@ struct Appendage {
   Hinge hinge;
 };
 
-/// Where everything is and how it moves. Velocities are angular velocity (hub axes), joint rates and q_dot; the quaternion is (w, x, y, z),
-/// hub BRF -> inertial.
+/// Where everything is and how it moves. Velocities are angular velocity (hub axes), joint rates and q_dot; the
+/// quaternion is (w, x, y, z), hub BRF -> inertial.
 struct State {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();         // R of the hub BRF, inertial axes [m]
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // R of the hub BRF, inertial axes [m]
   Eigen::Vector4d attitude = Eigen::Vector4d(1, 0, 0, 0);
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();         // Rdot, inertial axes [m/s]
-  Eigen::Vector3d omega = Eigen::Vector3d::Zero();            // hub axes [rad/s]
-  std::vector<double> angle;                                  // Theta [rad], per appendage
-  std::vector<double> rate;                                   // [rad/s]
-  std::vector<Eigen::VectorXd> q;                             // per appendage
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // Rdot, inertial axes [m/s]
+  Eigen::Vector3d omega = Eigen::Vector3d::Zero();     // hub axes [rad/s]
+  std::vector<double> angle;                           // Theta [rad], per appendage
+  std::vector<double> rate;                            // [rad/s]
+  std::vector<Eigen::VectorXd> q;                      // per appendage
   std::vector<Eigen::VectorXd> q_dot;
-  double dissipated = 0;                                      // energy lost since the start [J]
+  double dissipated = 0;  // energy lost since the start [J]
 };
 
 /// Energies [J] and momenta (inertial axes, about the inertial origin).
 struct Balance {
   double kinetic = 0;
-  double elastic = 0;  // booms, hinge springs and stops
+  double elastic = 0;                                          // booms, hinge springs and stops
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero();          // [kg m/s]
   Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();  // about the system's mass centre [N m s]
-  double momentum_scale = 0;          // sum of the bodies' |momentum|: what a drift is relative to
+  double momentum_scale = 0;  // sum of the bodies' |momentum|: what a drift is relative to
   double angular_momentum_scale = 0;
 };
 
 /// Places of the parts of the state vector y = [p | u | R | attitude | Rdot | dissipated]:
 /// p = (Delta_1, q_1, Delta_2, q_2, ...) with Delta = Theta - threshold, u = (omega, Delta_dot_1, q_dot_1, ...).
-/// With a fixed hub, omega, R, attitude and Rdot are absent. Delta, not Theta, is the unknown: near the stop it keeps its digits.
+/// With a fixed hub, omega, R, attitude and Rdot are absent. Delta, not Theta, is the unknown: near the stop it keeps
+/// its digits.
 struct Layout {
   std::vector<int> body;  // first entry of each appendage in p (Delta, then q)
   int p = 0;              // size of p
@@ -67,7 +68,8 @@ struct WorkspaceDeleter {
 };
 using WorkspaceHandle = std::unique_ptr<Workspace, WorkspaceDeleter>;
 
-/// Hub and hinged flexible bodies in relative coordinates: 6 (hub) + 1 per hinge + n per body. Never changes after construction.
+/// Hub and hinged flexible bodies in relative coordinates: 6 (hub) + 1 per hinge + n per body. Never changes after
+/// construction.
 class System {
  public:
   /// @throws InputError when a body is invalid, a hinge's directions are not orthonormal, or a mass matrix is singular.
@@ -92,14 +94,15 @@ class System {
   /// Allocates nothing.
   void derivative(const double* y, std::span<const char> contact, Workspace&, double* y_dot) const;
 
-  /// The Jacobian blocks at y, exact by forward differentiation: d(u_dot)/d(p, u) and d(a_hub)/d(p, u), kept in the workspace together with
-  /// the state they were taken at.
+  /// The Jacobian blocks at y, exact by forward differentiation: d(u_dot)/d(p, u) and d(a_hub)/d(p, u), kept in the
+  /// workspace together with the state they were taken at.
   void jacobian(const double* y, std::span<const char> contact, Workspace&) const;
 
   /// Prepares solves with I - gamma J. @throws NumericalError when it is singular.
   void factorise_newton(double gamma, Workspace&) const;
 
-  /// x = (I - gamma J)^-1 b with the blocks of `jacobian` and the gamma of `factorise_newton`; x and b may be the same array.
+  /// x = (I - gamma J)^-1 b with the blocks of `jacobian` and the gamma of `factorise_newton`; x and b may be the same
+  /// array.
   void solve_newton(const double* b, Workspace&, double* x) const;
 
   /// J itself, dense, from the kept blocks (for tests and spectra).

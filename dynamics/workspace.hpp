@@ -16,6 +16,7 @@ class Workspace {
   Workspace(const equations::Model& model, const Layout& layout)
       : scratch(model),
         dual_scratch(model),
+        parts(model.bodies.size()),
         dual_in(static_cast<size_t>(layout.p + layout.u)),
         dual_out(static_cast<size_t>(layout.u)),
         dudot(layout.u, layout.p + layout.u),
@@ -30,6 +31,7 @@ class Workspace {
 
   equations::Scratch<double> scratch;
   equations::Scratch<D> dual_scratch;
+  std::vector<equations::HubSystem<double>> parts;  // what each body adds to the hub
   std::vector<D> dual_in, dual_out;
 
   // Jacobian blocks and the state they belong to.

@@ -39,7 +39,7 @@ struct EigenSummary {
   double factor_seconds = 0;
   double eigen_seconds = 0;
   std::vector<std::vector<int>> pairs;  // groups of equal frequencies (indices, ascending)
-  std::string note;                // what had to be changed on the way (shift moved, ...), empty if nothing
+  std::string note;                     // what had to be changed on the way (shift moved, ...), empty if nothing
 };
 
 struct EigenPairs {

@@ -1,5 +1,5 @@
-// Speed of the SPORT scene, 2 modes per boom: the right-hand side against plain dense assembly, the Jacobian against differences, and whole runs with
-// the error they reach. Every figure stands beside one that was timed in the same run.
+// Speed of the SPORT scene, 2 modes per boom: the right-hand side against plain dense assembly, the Jacobian against
+// differences, and whole runs with the error they reach. Every figure stands beside one that was timed in the same run.
 
 #include "dynamics/integrator.hpp"
 #include "dynamics/rotation.hpp"
@@ -7,9 +7,9 @@
 
 #include "apps/simulate.hpp"
 
+#include <benchmark/benchmark.h>
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <benchmark/benchmark.h>
 
 #include <cmath>
 
@@ -42,7 +42,8 @@ VectorXd moving_state(const Flyable& f) {
   return integrate(f.system, f.y0, o).y.back();
 }
 
-/// The same accelerations the plain way: the mass matrices of section 3 of the theory, one dense projection, one dense solve.
+/// The same accelerations the plain way: the mass matrices of section 3 of the theory, one dense projection, one dense
+/// solve.
 VectorXd plain_accelerations(const System& system, const VectorXd& y, const std::vector<char>& contact) {
   const State s = system.unpack(y);
   const Layout& l = system.layout();
@@ -100,7 +101,8 @@ VectorXd plain_accelerations(const System& system, const VectorXd& y, const std:
     M += B.transpose() * Mb * B;
     f += B.transpose() * (Q - Mb * bias);
     const HingeMechanism& h = a.hinge.mechanism;
-    f[at] += h.stiffness * (h.rest - s.angle[i]) - h.damping * s.rate[i] - (contact[i] ? h.stop_stiffness * (s.angle[i] - h.threshold) : 0);
+    f[at] += h.stiffness * (h.rest - s.angle[i]) - h.damping * s.rate[i] -
+             (contact[i] ? h.stop_stiffness * (s.angle[i] - h.threshold) : 0);
   }
   return M.ldlt().solve(f);
 }
@@ -172,7 +174,8 @@ void NewtonDense(benchmark::State& state) {
   const auto work = f.system.workspace();
   f.system.jacobian(y.data(), contact, *work);
   const MatrixXd J = f.system.dense_jacobian(*work);
-  for (auto _ : state) benchmark::DoNotOptimize((MatrixXd::Identity(b.size(), b.size()) - 1e-4 * J).lu().solve(b).eval().data());
+  for (auto _ : state)
+    benchmark::DoNotOptimize((MatrixXd::Identity(b.size(), b.size()) - 1e-4 * J).lu().solve(b).eval().data());
 }
 BENCHMARK(NewtonDense);
 
@@ -206,8 +209,9 @@ void TenSeconds(benchmark::State& state) {
   state.counters["steps"] = static_cast<double>(r.summary.steps);
   state.counters["evaluations"] = static_cast<double>(r.summary.rhs_evaluations);
   state.counters["events"] = static_cast<double>(r.events.size());
-  state.counters["us_per_evaluation"] = benchmark::Counter(1e-6 * static_cast<double>(r.summary.rhs_evaluations),
-                                                           benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+  state.counters["us_per_evaluation"] =
+      benchmark::Counter(1e-6 * static_cast<double>(r.summary.rhs_evaluations),
+                         benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(TenSeconds)->DenseRange(3, 9, 1)->Unit(benchmark::kMillisecond)->MinTime(1);
 

@@ -15,7 +15,8 @@
 
 namespace flexboom::testing {
 
-/// A body made of point masses with made-up shapes: every invariant is non-zero, and sums over its points are an oracle.
+/// A body made of point masses with made-up shapes: every invariant is non-zero, and sums over its points are an
+/// oracle.
 struct PointBody {
   std::vector<double> dm;
   std::vector<Eigen::Vector3d> u0;

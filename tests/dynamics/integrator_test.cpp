@@ -21,7 +21,8 @@ std::vector<std::string> method_names() {
   for (const IntegratorMethod& m : integrator_methods()) names.emplace_back(m.name);
   return names;
 }
-INSTANTIATE_TEST_SUITE_P(Table, EveryMethod, ::testing::ValuesIn(method_names()), [](const auto& p) { return p.param; });
+INSTANTIATE_TEST_SUITE_P(Table, EveryMethod, ::testing::ValuesIn(method_names()),
+                         [](const auto& p) { return p.param; });
 
 /// Boom 2 of SPORT on a hub that does not move: rigid with the inertia of a solid bar, or with eq. 14 modes.
 System boom_2(int modes, double zeta = 0) {
@@ -117,7 +118,8 @@ TEST_P(EveryMethod, ErrorOfAnOscillatorFollowsTheTolerance) {
     o.duration = 2;  // 7 periods
     const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + 0.05})), o);
     double error = 0;
-    for (size_t i = 0; i < r.time.size(); ++i) error = std::max(error, std::abs(r.y[i][0] - 0.05 * std::cos(omega * r.time[i])));
+    for (size_t i = 0; i < r.time.size(); ++i)
+      error = std::max(error, std::abs(r.y[i][0] - 0.05 * std::cos(omega * r.time[i])));
     EXPECT_LT(error, 30 * tolerance * 0.05) << tolerance;  // 7 undamped periods add up some thirty local errors
     EXPECT_EQ(r.events.size(), 0U);
   }
@@ -139,7 +141,8 @@ TEST_P(EveryMethod, TorqueFreeTumblingMeetsTheEllipticFunctions) {
     const auto i = static_cast<size_t>(std::llround(std::stod(row[1])));
     if (i >= r.time.size()) continue;
     const State state = system.unpack(r.y[i]);
-    rate_error = std::max(rate_error, (state.omega - Vector3d(std::stod(row[2]), std::stod(row[3]), std::stod(row[4]))).norm());
+    rate_error =
+        std::max(rate_error, (state.omega - Vector3d(std::stod(row[2]), std::stod(row[3]), std::stod(row[4]))).norm());
     const Eigen::Vector4d q(std::stod(row[5]), std::stod(row[6]), std::stod(row[7]), std::stod(row[8]));
     attitude_error = std::max(attitude_error, std::min((state.attitude - q).norm(), (state.attitude + q).norm()));
   }

@@ -4,8 +4,8 @@
 #include "dynamics_testing.hpp"
 #include "fem/check.hpp"
 
-#include <Eigen/LU>
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 namespace flexboom {
 namespace {
@@ -164,7 +164,8 @@ TEST(System, PowerBalances) {
     const Balance b = c.system->balance(y);
     return Eigen::Matrix<double, 1, 1>(b.kinetic + b.elastic + y[c.system->layout().dissipated()]);
   };
-  EXPECT_NEAR(rate_of(c, energy)[0], 0, 1e-8);  // energies near 1 J, difference step 1e-6: truncation 1e-12 f''', round-off 1e-10
+  EXPECT_NEAR(rate_of(c, energy)[0], 0,
+              1e-8);  // energies near 1 J, difference step 1e-6: truncation 1e-12 f''', round-off 1e-10
 }
 
 TEST(System, MomentaAreConserved) {

@@ -31,7 +31,8 @@ double largest(const std::vector<double>& v) {
 }
 
 double hub_rotation(const RunResult& r) {
-  return std::max({largest(column(r, "hub.rotation.x")), largest(column(r, "hub.rotation.y")), largest(column(r, "hub.rotation.z"))});
+  return std::max({largest(column(r, "hub.rotation.x")), largest(column(r, "hub.rotation.y")),
+                   largest(column(r, "hub.rotation.z"))});
 }
 
 /// Fine output over the contacts that can be seen, with the beams that the scene ships.
@@ -54,13 +55,15 @@ TEST(PaperFigures, ElasticCoordinatePeaksAtEachStopContact) {
     for (size_t i = 0; i + 1 < r.trajectory.events.size(); ++i) {
       const Event& e = r.trajectory.events[i];
       if (r.bodies[static_cast<size_t>(e.hinge)].body.name != boom || !e.contact || std::abs(e.rate) < 0.02) continue;
-      const auto release = std::find_if(r.trajectory.events.begin() + static_cast<std::ptrdiff_t>(i) + 1, r.trajectory.events.end(),
-                                        [&](const Event& f) { return f.hinge == e.hinge; });
+      const auto release = std::find_if(r.trajectory.events.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+                                        r.trajectory.events.end(), [&](const Event& f) { return f.hinge == e.hinge; });
       if (release == r.trajectory.events.end()) break;
-      // The largest deflection from one free flight to the next lies while the stop is closed, and is a multiple of that before.
+      // The largest deflection from one free flight to the next lies while the stop is closed, and is a multiple of
+      // that before.
       const double flight = 0.8 * (release->time - e.time);
-      const auto peak = std::max_element(q.begin() + static_cast<std::ptrdiff_t>(at(e.time - flight)),
-                                         q.begin() + static_cast<std::ptrdiff_t>(std::min(q.size() - 1, at(release->time + flight))));
+      const auto peak =
+          std::max_element(q.begin() + static_cast<std::ptrdiff_t>(at(e.time - flight)),
+                           q.begin() + static_cast<std::ptrdiff_t>(std::min(q.size() - 1, at(release->time + flight))));
       const double when = static_cast<double>(peak - q.begin()) * r.scene.output_step;
       EXPECT_GT(when, e.time) << boom;
       EXPECT_LT(when, release->time + r.scene.output_step) << boom;
@@ -78,7 +81,8 @@ TEST(PaperFigures, BoomsTwoAndThreeMoveAlike) {
     const std::vector<double> minus = column(r, std::string("efield_minus") + output);
     double difference = 0;
     for (size_t i = 0; i < plus.size(); ++i) difference = std::max(difference, std::abs(plus[i] - minus[i]));
-    // Alike, not equal: the product of inertia of the hub and the rotation that SIP makes couple into them by parts in a thousand.
+    // Alike, not equal: the product of inertia of the hub and the rotation that SIP makes couple into them by parts in
+    // a thousand.
     EXPECT_LT(difference, 2e-3 * largest(plus)) << output;
     EXPECT_GT(difference, 0) << output;
   }
@@ -103,8 +107,10 @@ TEST(PaperFigures, HubTurnsMostAboutX1DrivenBySip) {
 
 TEST(PaperFigures, AttitudeIsReportedInTheOrbitFrame) {
   const RunResult& r = first_second();
-  const std::vector<double> t = column(r, "t"), roll = column(r, "lvlh.roll"), pitch = column(r, "lvlh.pitch"), yaw = column(r, "lvlh.yaw");
-  const std::vector<double> x = column(r, "hub.rotation.x"), y = column(r, "hub.rotation.y"), z = column(r, "hub.rotation.z");
+  const std::vector<double> t = column(r, "t"), roll = column(r, "lvlh.roll"), pitch = column(r, "lvlh.pitch"),
+                            yaw = column(r, "lvlh.yaw");
+  const std::vector<double> x = column(r, "hub.rotation.x"), y = column(r, "hub.rotation.y"),
+                            z = column(r, "hub.rotation.z");
   // A hub at rest in inertial space pitches up at the orbit rate, 2 pi / 92.66 min; small angles else.
   const double rate = 2 * pi / (92.66 * 60);
   for (size_t i = 0; i < t.size(); ++i) {
@@ -158,7 +164,8 @@ TEST(Sport, ErrorBudgetBoundsTheErrorOfARunAgainstABetterOne) {
   scene.tolerance = 1e-9;
   scene.error_budget = false;
   double error = 0;
-  for (const OutputDifference& d : compare_outputs(coarse.outputs, run_scene(scene, {}).outputs, {})) error = std::max(error, d.error);
+  for (const OutputDifference& d : compare_outputs(coarse.outputs, run_scene(scene, {}).outputs, {}))
+    error = std::max(error, d.error);
   EXPECT_LT(error, 1.5e-5);  // the tenth of the tolerance it was compared with has an error of its own
 }
 

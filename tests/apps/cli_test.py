@@ -1,0 +1,806 @@
+"""The program from outside: exit codes, streams, files. Usage: cli_test.py PROGRAM [unittest arguments]"""
+
+import csv
+import html.parser
+import json
+import math
+import os
+import pathlib
+import pty
+import re
+import resource
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+
+TESTS = pathlib.Path(__file__).resolve().parent.parent
+MESHES = TESTS.parent / "meshes"
+BOOM4 = MESHES / "boom4.toml"
+BOOMS = ("efield_plus", "efield_minus", "sip", "slp")
+OK, USAGE, INPUT, NUMERICAL, CHECK_FAILED, INTERRUPTED = 0, 2, 3, 4, 5, 130
+PROGRAM = os.environ.get("FLEXBOOM_PROGRAM", "flexboom")
+
+
+def flexboom(*arguments, **options):
+    """Runs the program to its end; stdout and stderr as text."""
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": 60, **options}
+    return subprocess.run([PROGRAM, *map(str, arguments)], stdin=subprocess.DEVNULL, text=True, **options)
+
+
+def read_csv(path):
+    with open(path, newline="") as file:
+        return list(csv.reader(file))
+
+
+def columns(path):
+    """trajectory.csv as arrays by name."""
+    rows = read_csv(path)
+    return dict(zip(rows[0], np.array(rows[1:], float).T))
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="flexboom-cli-"))
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def assert_exit(self, code, result):
+        self.assertEqual(result.returncode, code, (result.args, result.stdout, result.stderr))
+
+    def run_sport(self, *arguments, out="out"):
+        """A short SPORT run without repeats that must succeed; returns its folder."""
+        folder = self.folder / out
+        self.assert_exit(OK, flexboom("run", "sport", "--no-budget", "--quiet", "--out", folder, *arguments))
+        return folder
+
+    def check_types(self, document, types, where=""):
+        for key, kind in types.items():
+            self.assertIn(key, document, where)
+            if isinstance(kind, dict):
+                self.check_types(document[key], kind, where + key + ".")
+            else:
+                self.assertIsInstance(document[key], kind, where + key)
+
+    def endless(self):
+        """SPORT without any damping: it never comes to rest, so 1e5 s of it take hours."""
+        text = (MESHES / "sport.toml").read_text()
+        text = re.sub(r"(?m)^damping = .*$", "", text).replace("P2 = 0.01", "P2 = 0.0")
+        scene = self.folder / "endless.toml"
+        scene.write_text(text)
+        return ["run", scene, "--no-budget", "--duration", "1e5", "--out", self.folder / "out"]
+
+    def summary(self, folder):
+        return json.loads((folder / "summary.json").read_text())
+
+
+class Usage(Case):
+    def assert_usage(self, *arguments, words=""):
+        result = flexboom(*arguments, cwd=self.folder)
+        self.assert_exit(USAGE, result)
+        self.assertEqual(result.stdout, "")
+        self.assertIn(words, result.stderr)
+        self.assertEqual(os.listdir(self.folder), [])
+
+    def test_no_command(self):
+        self.assert_usage(words="command")
+
+    def test_unknown_command(self):
+        self.assert_usage("fly", words="fly")
+
+    def test_unknown_option(self):
+        for command in ("run", "check", "modes", "compare", "report"):
+            self.assert_usage(command, "sport", "--bogus", words="--bogus")
+
+    def test_missing_argument(self):
+        for command in ("run", "check", "modes", "compare", "report"):
+            self.assert_usage(command, words="required")
+
+    def test_option_without_its_value(self):
+        self.assert_usage("run", "sport", "--duration")
+
+    def test_text_where_a_number_belongs(self):
+        self.assert_usage("run", "sport", "--duration", "long", words="long")
+        self.assert_usage("run", "sport", "--threads", "0", words="threads")
+
+    def test_free_and_clamp_exclude_each_other(self):
+        self.assert_usage("modes", BOOM4, "--free", "--clamp", "root", words="--clamp")
+
+    def test_help_of_every_command(self):
+        for arguments in ([], ["run"], ["check"], ["modes"], ["compare"], ["report"]):
+            result = flexboom(*arguments, "--help")
+            self.assert_exit(OK, result)
+            self.assertIn("--help", result.stdout)
+            self.assertEqual(result.stderr, "")
+
+    def test_help_names_every_promised_option(self):
+        run, modes = flexboom("run", "--help").stdout, flexboom("modes", "--help").stdout
+        for option in ("--json", "--quiet", "--out", "--threads", "--help", "--version", "--duration", "--tolerance",
+                       "--modes", "--structure", "--formulation", "--integrator", "--output-step"):
+            self.assertIn(option, run)
+        for option in ("--count", "--backend", "--clamp", "--material", "--free", "--vtu"):
+            self.assertIn(option, modes)
+
+    def test_version_names_linked_libraries_and_licences(self):
+        result = flexboom("--version")
+        self.assert_exit(OK, result)
+        lines = result.stdout.splitlines()
+        for name, licence in (("Eigen", "MPL"), ("CHOLMOD", "GPL"), ("ARPACK", "BSD"), ("Spectra", "MPL"),
+                              ("SUNDIALS", "BSD"), ("CLI11", "BSD"), ("toml++", "MIT"), ("nlohmann-json", "MIT"),
+                              ("fmt", "MIT"), ("METIS", "Apache"), ("BLAS", "BSD"), ("AMD", "BSD"), ("GNU", "GPL")):
+            self.assertTrue(any(name in line and licence in line for line in lines), name)
+        self.assertRegex(result.stdout, r"supernodal.*binary.*GPL")
+
+    def test_version_after_a_command(self):
+        self.assert_exit(OK, flexboom("run", "--version"))
+
+
+class BadInput(Case):
+    def assert_refused(self, *arguments, words):
+        """Exit 3, a message with these words, and nothing written anywhere."""
+        before = sorted(self.folder.rglob("*"))
+        result = flexboom(*arguments, cwd=self.folder)
+        self.assert_exit(INPUT, result)
+        self.assertEqual(result.stdout, "")
+        self.assertIn(words, result.stderr)
+        self.assertTrue(result.stderr.startswith("error: ") or "\nerror: " in result.stderr, result.stderr)
+        self.assertEqual(sorted(self.folder.rglob("*")), before)
+
+    def assert_run_refused(self, *arguments, words):
+        self.assert_refused("run", "sport", "--no-budget", "--out", "out", *arguments, words=words)
+
+    def test_broken_scenes(self):
+        for name in ("missing_key.toml", "unknown_key.toml", "negative_length.toml", "nu_too_large.toml", "empty.toml"):
+            scene = TESTS / "apps" / "broken" / name
+            for command in (["run", scene, "--out", "out"], ["check", scene], ["compare", scene]):
+                self.assert_refused(*command, words=name + ":")
+
+    def test_missing_scene_names_the_built_in_ones(self):
+        self.assert_refused("run", "absent.toml", words="sport")
+        self.assert_refused("check", "absent.toml", words="absent.toml")
+        self.assert_refused("compare", "absent.toml", words="absent.toml")
+
+    def test_modes_that_are_no_number(self):
+        for text in ("many", "-1", "2.5", "99999999999"):
+            self.assert_run_refused("--modes", text, words=f"'{text}'")
+
+    def test_more_modes_than_unknowns(self):
+        self.assert_run_refused("--modes", "1000", "--structure", "beam", words="modes")
+
+    def test_choices_of_other_versions(self):
+        self.assert_run_refused("--structure", "solid", words="solid")
+        self.assert_run_refused("--formulation", "multipliers", words="multipliers")
+
+    def test_unknown_choices_list_what_there_is(self):
+        self.assert_run_refused("--integrator", "nonsense", words='"bdf"')
+        self.assert_run_refused("--structure", "nonsense", words='"beam"')
+        self.assert_refused("modes", BOOM4, "--backend", "nonsense", words='"arpack"')
+
+    def test_impossible_numbers(self):
+        for option, key in (("--duration", "duration"), ("--output-step", "output_step"), ("--tolerance", "tolerance")):
+            for value in ("-1", "0", "nan", "inf"):
+                if (option, value) != ("--output-step", "inf"):
+                    self.assert_run_refused(option, value, words=key)
+        self.assert_run_refused("--vtu-step", "-1", words="vtu_step")
+        self.assert_run_refused("--output-step", "1e-9", words="rows")
+
+    def test_output_folder_below_a_file(self):
+        (self.folder / "file").write_text("")
+        self.assert_refused("run", "sport", "--out", "file/out", words="file/out: Not a directory")
+        self.assert_refused("run", "sport", "--out", "file", words="Not a directory")
+        self.assert_refused("modes", BOOM4, "--vtu", "file/shapes.vtu", words="file/shapes.vtu")
+
+    def test_modes_of_something_else(self):
+        self.assert_refused("modes", "absent.toml", words="absent.toml")
+        self.assert_refused("modes", MESHES / "sport.toml", words="flexboom-body-1")
+        for mesh in ("mesh.inp", "mesh.msh", "mesh.vtu"):
+            self.assert_refused("modes", mesh, words=".toml")
+
+    def test_modes_options(self):
+        self.assert_refused("modes", BOOM4, "--count", "100000", words="unknowns")
+        self.assert_refused("modes", BOOM4, "--count", "0", words="--count")
+        self.assert_refused("modes", BOOM4, "--clamp", "absent", words='"root"')
+        for text in ("nonsense", "67e9,0.33", "67e9,0.33,2840,1", "67e9,0.6,2840", "-1,0.3,1", "nan,0.3,1"):
+            self.assert_refused("modes", BOOM4, "--material", text, words="material")
+
+    def test_compare_needs_a_uniform_boom(self):
+        self.assert_refused("compare", MESHES / "stepped_boom.toml", words="uniform")
+
+    def test_check_as_json_lists_the_faults(self):
+        result = flexboom("check", TESTS / "apps" / "broken" / "several_faults.toml", "--json")
+        self.assert_exit(INPUT, result)
+        document = json.loads(result.stdout)
+        self.assertIs(document["ok"], False)
+        self.assertGreater(len(document["faults"]), 1)
+
+
+class Numerical(Case):
+    def test_tolerance_below_round_off(self):
+        result = flexboom("run", "sport", "--no-budget", "--tolerance", "1e-17", "--out", self.folder / "out")
+        self.assert_exit(NUMERICAL, result)
+        self.assertIn("error: ", result.stderr)
+        self.assertFalse((self.folder / "out" / "trajectory.csv").exists())
+
+    def test_scene_that_overflows(self):
+        scene = self.folder / "scene.toml"
+        scene.write_text((MESHES / "sport.toml").read_text().replace("P1 = 0.35", "P1 = 1e300"))
+        result = flexboom("run", scene, "--no-budget", "--duration", "0.1", "--out", self.folder / "out")
+        self.assert_exit(NUMERICAL, result)
+        self.assertIn("not finite", result.stderr)
+
+
+class Streams(Case):
+    def commands(self):
+        folder = self.run_sport("--duration", "0.2")
+        return {"run": ["run", "sport", "--no-budget", "--duration", "0.2", "--out", self.folder / "again"],
+                "check": ["check", "sport"], "check body": ["check", BOOM4], "modes": ["modes", BOOM4],
+                "compare": ["compare", BOOM4, "--count", "4"], "report": ["report", folder]}
+
+    def test_quiet_prints_nothing(self):
+        for name, command in self.commands().items():
+            result = flexboom(*command, "--quiet")
+            self.assert_exit(OK, result)
+            self.assertEqual((result.stdout, result.stderr), ("", ""), name)
+
+    def test_json_is_one_document(self):
+        for name, command in self.commands().items():
+            result = flexboom(*command, "--json", "--quiet")
+            self.assert_exit(OK, result)
+            self.assertIsInstance(json.loads(result.stdout), dict, name)
+            self.assertEqual(result.stderr, "", name)
+
+    def test_plain_output_is_for_people(self):
+        for name, command in self.commands().items():
+            result = flexboom(*command)
+            self.assert_exit(OK, result)
+            self.assertTrue(result.stdout, name)
+            self.assertNotRegex(result.stderr, r"\r|\x1b|%", name)
+
+    def test_stdout_that_cannot_be_written(self):
+        commands = [*([*c, "--json"] for c in self.commands().values()), ["--version"], ["run", "--help"]]
+        for command in commands:
+            with open("/dev/full", "w") as full:
+                result = flexboom(*command, stdout=full)
+            self.assert_exit(INPUT, result)
+            self.assertIn("No space left on device", result.stderr)
+            closed = flexboom(*command, stdout=None, preexec_fn=lambda: os.close(1))
+            self.assert_exit(INPUT, closed)
+            self.assertIn("Bad file descriptor", closed.stderr)
+
+    def test_run_keeps_its_files_when_stdout_is_full(self):
+        with open("/dev/full", "w") as full:
+            self.assert_exit(INPUT, flexboom(*self.commands()["run"], "--json", stdout=full))
+        self.assertTrue((self.folder / "again" / "summary.json").exists())
+
+    def test_reader_that_leaves(self):
+        reader, writer = os.pipe()
+        os.close(reader)
+        result = flexboom("compare", BOOM4, stdout=writer)
+        os.close(writer)
+        self.assert_exit(INPUT, result)
+        self.assertIn("Broken pipe", result.stderr)
+
+    def test_stderr_that_cannot_be_written_does_no_harm(self):
+        with open("/dev/full", "w") as full:
+            self.assert_exit(OK, flexboom(*self.commands()["run"], stderr=full))
+            self.assert_exit(INPUT, flexboom("run", "absent", stderr=full))
+
+    def on_terminal(self, *arguments, interrupt_after=None):
+        """Exit code and what a terminal saw (stdout and stderr are the same pty)."""
+        master, slave = pty.openpty()
+        process = subprocess.Popen([PROGRAM, *map(str, arguments)], stdin=slave, stdout=slave, stderr=slave)
+        os.close(slave)
+        seen, start = b"", time.monotonic()
+        while process.poll() is None or select.select([master], [], [], 0)[0]:
+            if select.select([master], [], [], 0.05)[0]:
+                try:
+                    part = os.read(master, 65536)
+                except OSError:  # Linux: EIO when the other end is closed
+                    break
+                seen += part
+            if interrupt_after and time.monotonic() - start > interrupt_after:
+                process.send_signal(signal.SIGINT)
+                interrupt_after = None
+        os.close(master)
+        return process.wait(), seen.decode()
+
+    def test_progress_line_on_a_terminal(self):
+        code, seen = self.on_terminal(*self.endless(), interrupt_after=1.8)
+        self.assertEqual(code, INTERRUPTED)
+        shown = re.findall(r"\r *\d+ % [^\r]* s simulated in [^\r]* s, [^\r]* s left[^\r]*", seen)
+        self.assertTrue(shown, seen)
+        self.assertLess(max(map(len, shown)), 81)  # one line of an ordinary terminal, and \r
+        after = seen[seen.rindex(shown[-1]) + len(shown[-1]):]
+        self.assertRegex(after, r"^\r {79}\r\S", "the line must be gone before anything else is printed")
+        self.assertNotIn("\x1b", seen)
+
+    def test_no_progress_line_for_short_work_or_json_or_quiet(self):
+        out = self.folder / "out"
+        code, seen = self.on_terminal("run", "sport", "--no-budget", "--duration", "0.2", "--out", out)
+        self.assertEqual(code, OK)
+        self.assertNotIn("\r ", seen)
+        for option in ("--json", "--quiet"):
+            code, seen = self.on_terminal(*self.endless(), option, interrupt_after=1.5)
+            self.assertEqual(code, INTERRUPTED)
+            self.assertNotIn("s left", seen)
+
+
+class RunFiles(Case):
+    HEADER = (["t"] + [f"hub.{q}.{a}" for q in ("rotation", "rate", "position") for a in "xyz"] +
+              ["lvlh.roll", "lvlh.pitch", "lvlh.yaw"] +
+              [f"{b}.{c}" for b in BOOMS for c in ("angle", "rate", "q1", "q2", "tip.x", "tip.y", "tip.z")] +
+              ["energy.kinetic", "energy.elastic", "energy.dissipated"])
+
+    def test_files_as_promised(self):
+        folder = self.run_sport("--duration", "0.2")
+        self.assertEqual(sorted(os.listdir(folder)), ["events.csv", "scene.toml", "summary.json", "trajectory.csv"])
+        folder = self.run_sport("--duration", "0.2", "--report", "--vtu-step", "0.1", out="more")
+        self.assertLess({"report.html", "motion.pvd", "motion_00000.vtu", "motion_00002.vtu"}, set(os.listdir(folder)))
+
+    def test_trajectory(self):
+        folder = self.run_sport("--duration", "1.3", "--output-step", "0.02")
+        rows = read_csv(folder / "trajectory.csv")
+        self.assertEqual(rows[0], self.HEADER)
+        self.assertEqual(len(rows) - 1, 66)
+        values = np.array(rows[1:], float)
+        self.assertTrue(np.isfinite(values).all())
+        np.testing.assert_allclose(values[:, 0], np.arange(66) * 0.02, rtol=1e-15)
+        # 17 significant digits: as many texts have that many as digits at random do not end in zeros
+        texts = [t for row in rows[2:] for t in row[1:]]
+        digits = [len(re.sub(r"e.*|[-.]", "", t).lstrip("0")) for t in texts]
+        self.assertGreater(np.mean(np.array(digits) >= 16), 0.9)
+        self.assertTrue(all(t == f"{float(t):.17g}" for t in texts))
+
+    def test_events(self):
+        folder = self.run_sport("--duration", "1")
+        rows = read_csv(folder / "events.csv")
+        self.assertEqual(rows[0], ["time", "hinge", "kind"])
+        self.assertEqual(len(rows) - 1, self.summary(folder)["events"])
+        times = [float(r[0]) for r in rows[1:]]
+        self.assertEqual(times, sorted(times))
+        self.assertTrue(0 < times[0] and times[-1] <= 1)
+        self.assertTrue(all(r[0] == f"{float(r[0]):.17g}" for r in rows[1:]))
+        for boom in BOOMS:
+            kinds = [r[2] for r in rows[1:] if r[1] == boom]
+            self.assertEqual(kinds, [("contact", "release")[i % 2] for i in range(len(kinds))], boom)
+        self.assertEqual({r[1] for r in rows[1:]} - set(BOOMS), set())
+
+    def test_stop_is_touched_where_the_trajectory_says_so(self):
+        folder = self.run_sport("--duration", "0.5", "--output-step", "0.001")
+        first = next(r for r in read_csv(folder / "events.csv")[1:] if r[1] == "sip")
+        table = columns(folder / "trajectory.csv")
+        crossing = np.argmax(table["sip.angle"] > np.pi / 2)
+        self.assertTrue(table["t"][crossing - 1] <= float(first[0]) <= table["t"][crossing])
+
+    def test_summary(self):
+        result = flexboom("run", "sport", "--duration", "0.5", "--json", "--out", self.folder / "out")
+        self.assert_exit(OK, result)
+        document = json.loads(result.stdout)
+        self.assertEqual(document, self.summary(self.folder / "out"))
+        number = (int, float)
+        self.check_types(document, {
+            "scene": str, "version": str, "steps": int, "rhs_evaluations": int, "events": int,
+            "seconds": {k: number for k in ("prepare", "integrate", "write", "total")},
+            "real_time_factor": number, "energy_balance": number, "momentum_drift": number, "constraint_drift": number,
+            "error_budget": {k: number for k in ("discretisation", "truncation", "time", "linearisation", "total")},
+            "plan": list, "bodies": list, "invariant_checks": list, "interrupted": bool, "simulated_seconds": number})
+        self.assertEqual([b["name"] for b in document["bodies"]], list(BOOMS))
+        for body in document["bodies"]:
+            self.check_types(body, {"structure": str, "dofs": int, "modes": int, "frequencies_hz": list})
+            self.assertEqual(len(body["frequencies_hz"]), body["modes"])
+        self.assertTrue(document["invariant_checks"])
+        for check in document["invariant_checks"]:
+            self.check_types(check, {"name": str, "value": number, "reference": number, "relative_error": number,
+                                     "passed": bool})
+            self.assertTrue(check["passed"])
+        self.assertEqual((document["interrupted"], document["simulated_seconds"]), (False, 0.5))
+        budget = document["error_budget"]
+        parts = sum(budget[k] for k in ("discretisation", "truncation", "time", "linearisation"))
+        self.assertAlmostEqual(budget["total"], parts, delta=1e-15)
+        self.assertTrue(all(isinstance(line, str) for line in document["plan"]))
+
+    def test_budget_not_measured_is_null(self):
+        budget = self.summary(self.run_sport("--duration", "0.1"))["error_budget"]
+        self.assertEqual(set(budget.values()), {None})
+
+    def test_overrides_take_effect(self):
+        for structure in ("eq14", "beam", "rigid"):
+            folder = self.run_sport("--duration", "0.1", "--structure", structure, "--modes", "3", out=structure)
+            for body in self.summary(folder)["bodies"]:
+                self.assertEqual((body["structure"], body["modes"]), (structure, 0 if structure == "rigid" else 3))
+            self.assertEqual("sip.q3" in columns(folder / "trajectory.csv"), structure != "rigid")
+        self.assertIn("bdf", self.summary(self.run_sport("--duration", "0.1", "--integrator", "bdf"))["integrator"])
+
+    def test_tolerance_takes_effect(self):
+        loose = self.summary(self.run_sport("--duration", "0.1", "--tolerance", "1e-4"))
+        tight = self.summary(self.run_sport("--duration", "0.1", "--tolerance", "1e-9"))
+        self.assertEqual((loose["tolerance"], tight["tolerance"]), (1e-4, 1e-9))
+        self.assertLess(1.5 * loose["steps"], tight["steps"])
+
+    def test_modes_chosen_by_the_program(self):
+        folder = self.run_sport("--duration", "0.02", "--tolerance", "1e-2", "--modes", "auto")
+        self.assertTrue(all(b["modes"] >= 1 for b in self.summary(folder)["bodies"]))
+        self.assertTrue(any(line.startswith("modes:") for line in self.summary(folder)["plan"]))
+
+    def test_same_run_same_bits(self):
+        runs = [self.run_sport("--duration", "0.5", *extra, out=name)
+                for name, extra in (("a", []), ("b", []), ("c", ["--threads", "2"]))]
+        for name in ("trajectory.csv", "events.csv", "scene.toml"):
+            self.assertEqual({(folder / name).read_bytes() for folder in runs}, {(runs[0] / name).read_bytes()}, name)
+
+    def test_resolved_scene_repeats_the_run(self):
+        first = self.run_sport("--duration", "0.5", "--modes", "3", "--tolerance", "1e-5", "--output-step", "0.05")
+        self.assert_exit(OK, flexboom("check", first / "scene.toml"))
+        second = self.folder / "second"
+        self.assert_exit(OK, flexboom("run", first / "scene.toml", "--quiet", "--out", second))
+        for name in ("trajectory.csv", "events.csv", "scene.toml"):
+            self.assertEqual((first / name).read_bytes(), (second / name).read_bytes(), name)
+
+    def test_built_in_scene_is_the_file(self):
+        self.assert_exit(OK, flexboom("run", MESHES / "sport.toml", "--no-budget", "--quiet", "--duration", "0.2",
+                                      "--out", self.folder / "file"))
+        self.assertEqual((self.run_sport("--duration", "0.2") / "trajectory.csv").read_bytes(),
+                         (self.folder / "file" / "trajectory.csv").read_bytes())
+
+    def test_results_go_below_the_working_folder_by_default(self):
+        self.assert_exit(OK, flexboom("run", "sport", "--no-budget", "--duration", "0.1", cwd=self.folder))
+        self.assertTrue((self.folder / "results" / "sport" / "summary.json").exists())
+
+
+class Interrupted(Case):
+    def interrupt(self, kind, *arguments, after=1.0):
+        process = subprocess.Popen([PROGRAM, *map(str, arguments)],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        time.sleep(after)
+        process.send_signal(kind)
+        out, err = process.communicate(timeout=20)
+        self.assertEqual(process.returncode, INTERRUPTED, (out, err))
+        return out, err
+
+    def check_folder(self):
+        folder = self.folder / "out"
+        summary, rows = self.summary(folder), read_csv(folder / "trajectory.csv")
+        self.assertIs(summary["interrupted"], True)
+        self.assertGreater(summary["simulated_seconds"], 0)
+        self.assertLess(summary["simulated_seconds"], 1e5)
+        self.assertEqual({len(row) for row in rows}, {len(RunFiles.HEADER)})
+        values = np.array(rows[1:], float)
+        self.assertTrue(np.isfinite(values).all())
+        self.assertTrue((np.diff(values[:, 0]) > 0).all())
+        self.assertEqual(values[-1, 0], summary["simulated_seconds"])
+        self.assertEqual(len(read_csv(folder / "events.csv")) - 1, summary["events"])
+        self.assert_exit(OK, flexboom("check", folder / "scene.toml"))
+        self.assert_exit(OK, flexboom("report", folder))
+
+    def test_control_c(self):
+        _, err = self.interrupt(signal.SIGINT, *self.endless(), after=1.6)
+        self.assertIn("interrupted", err)
+        self.assertNotIn("s left", err)  # no progress line: this is no terminal
+        self.check_folder()
+
+    def test_terminate(self):
+        self.interrupt(signal.SIGTERM, *self.endless())
+        self.check_folder()
+
+    def test_json_is_whole(self):
+        out, _ = self.interrupt(signal.SIGINT, *self.endless(), "--json")
+        self.assertIs(json.loads(out)["interrupted"], True)
+
+    def test_while_the_errors_are_measured(self):
+        # after two seconds the run, of less than one, is over, and its repeats, tighter and with more modes, go on
+        out = self.folder / "out"
+        self.interrupt(signal.SIGINT, "run", "sport", "--duration", "0.3", "--tolerance", "1e-10", "--modes", "6",
+                       "--out", out, after=2.0)
+        self.assertIsNone(self.summary(out)["error_budget"]["total"])
+        self.assertEqual(columns(out / "trajectory.csv")["t"][-1], self.summary(out)["simulated_seconds"])
+
+
+class DiskFull(Case):
+    """A limit on the size of a file stands in for a full disk: write() fails in the same place, with another reason."""
+
+    def limited(self, size, *arguments):
+        return flexboom(*arguments, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
+
+    def test_trajectory_is_whole_or_absent(self):
+        out = self.folder / "out"
+        result = self.limited(20000, "run", "sport", "--no-budget", "--duration", "1", "--out", out)
+        self.assert_exit(INPUT, result)
+        self.assertIn(f"cannot write {out / 'trajectory.csv'}: File too large", result.stderr)
+        self.assertEqual(os.listdir(out), ["scene.toml"])
+
+    def test_no_mixture_with_an_older_run(self):
+        out = self.run_sport("--duration", "0.1", "--report", "--vtu-step", "0.1")
+        self.assert_exit(INPUT, self.limited(20000, "run", "sport", "--no-budget", "--duration", "1", "--out", out))
+        left = {file for file in os.listdir(out) if not file.endswith(".vtu")}
+        self.assertEqual(left, {"scene.toml"})
+
+    def test_nothing_can_be_written(self):
+        out = self.folder / "out"
+        result = self.limited(100, "run", "sport", "--no-budget", "--duration", "0.1", "--out", out)
+        self.assert_exit(INPUT, result)
+        self.assertIn("scene.toml: File too large", result.stderr)
+        self.assertEqual(os.listdir(out), [])
+
+    def test_shapes(self):
+        result = self.limited(100, "modes", BOOM4, "--vtu", self.folder / "shapes.vtu")
+        self.assert_exit(INPUT, result)
+        self.assertIn("shapes.vtu: File too large", result.stderr)
+
+    def test_report(self):
+        folder = self.run_sport("--duration", "0.2")
+        result = self.limited(1000, "report", folder)
+        self.assert_exit(INPUT, result)
+        self.assertIn("report.html: File too large", result.stderr)
+        self.assertFalse((folder / "report.html").exists())
+
+    def test_really_full(self):
+        disk = self.folder / "disk"
+        disk.mkdir()
+        if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], capture_output=True).returncode:
+            self.skipTest("cannot mount a small disk")
+        self.addCleanup(subprocess.run, ["umount", disk])
+        result = flexboom("run", "sport", "--no-budget", "--duration", "2", "--out", disk / "out")
+        self.assert_exit(INPUT, result)
+        self.assertIn("trajectory.csv: No space left on device", result.stderr)
+        self.assertEqual(os.listdir(disk / "out"), ["scene.toml"])
+
+
+# Boom axes of SPORT: hinge point and outward normal in hub axes; stowed along y, so at angle th the boom's x axis is
+# cos(th) e_y + sin(th) n, its y axis the derivative of that. Lengths as in Table 1.
+HINGES = {"efield_plus": ((0.05, -0.10, 0), (1, 0, 0), 0.295), "efield_minus": ((-0.05, -0.10, 0), (-1, 0, 0), 0.295),
+          "sip": ((0, -0.10, -0.17), (0, 0, -1), 0.302), "slp": ((0, -0.10, 0.17), (0, 0, 1), 0.146)}
+
+
+def rotate(vector, v):
+    """v turned by a rotation vector (Rodrigues)."""
+    angle = np.linalg.norm(vector)
+    if angle == 0:
+        return v
+    k = vector / angle
+    return v * math.cos(angle) + np.cross(k, v) * math.sin(angle) + k * (k @ v) * (1 - math.cos(angle))
+
+
+def tip_of(row, boom):
+    """Where the tip of a boom is in inertial axes [m], from the columns of trajectory.csv alone."""
+    point, outward, length = HINGES[boom]
+    angle, stowed = row[f"{boom}.angle"], np.array([0.0, 1, 0])
+    along = math.cos(angle) * stowed + math.sin(angle) * np.array(outward)
+    across = -math.sin(angle) * stowed + math.cos(angle) * np.array(outward)
+    x, y, z = (row[f"{boom}.tip.{axis}"] for axis in "xyz")
+    in_hub = np.array(point) + (length + x) * along + y * across + z * np.cross(along, across)
+    vector = np.array([row[f"hub.rotation.{axis}"] for axis in "xyz"])
+    return np.array([row[f"hub.position.{axis}"] for axis in "xyz"]) + rotate(vector, in_hub)
+
+
+def open_with_vtk(path):
+    import vtk
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    return reader.GetErrorCode(), reader.GetOutput()
+
+
+class Vtu(Case):
+    def test_motion_opens_and_is_the_trajectory(self):
+        import meshio
+        folder = self.run_sport("--duration", "2", "--vtu-step", "0.5")
+        table = columns(folder / "trajectory.csv")
+        frames = [(float(d.get("timestep")), folder / d.get("file"))
+                  for d in ElementTree.parse(folder / "motion.pvd").iter("DataSet")]
+        np.testing.assert_allclose([t for t, _ in frames], np.arange(5) * 0.5, rtol=1e-15)
+        self.assertEqual({file for _, file in frames}, set(folder.glob("*.vtu")))
+        for t, file in frames:
+            row = {name: column[np.argmin(abs(table["t"] - t))] for name, column in table.items()}
+            self.assertAlmostEqual(row["t"], t, delta=1e-12)
+            mesh = meshio.read(file)
+            error, grid = open_with_vtk(file)
+            self.assertEqual(error, 0)
+            self.assertEqual(grid.GetNumberOfPoints(), len(mesh.points))
+            self.assertEqual(grid.GetNumberOfCells(), sum(len(block.data) for block in mesh.cells))
+            self.assertTrue(np.isfinite(mesh.points).all())
+            self.assertEqual(mesh.point_data["displacement"].shape, mesh.points.shape)
+            for number, boom in enumerate(BOOMS, 1):
+                of_boom = [block.data[np.ravel(body) == number]
+                           for block, body in zip(mesh.cells, mesh.cell_data["body"]) if block.type == "line"]
+                tip = mesh.points[np.concatenate(of_boom).max()]
+                # metres with some 16 digits, a few roundings on either side
+                np.testing.assert_allclose(tip, tip_of(row, boom), rtol=0, atol=1e-12, err_msg=f"{boom} at {t}")
+
+    def test_shapes_open(self):
+        import meshio
+        file = self.folder / "shapes.vtu"
+        self.assert_exit(OK, flexboom("modes", BOOM4, "--count", "4", "--vtu", file, "--quiet"))
+        mesh = meshio.read(file)
+        error, grid = open_with_vtk(file)
+        self.assertEqual((error, grid.GetNumberOfPoints()), (0, len(mesh.points)))
+        self.assertEqual(len(mesh.point_data), 4)
+        for name, shape in mesh.point_data.items():
+            self.assertTrue(np.isfinite(shape).all() and abs(shape).max() > 0, name)
+            self.assertEqual(abs(shape[np.argmin(mesh.points[:, 0])]).max(), 0, "the root is clamped")
+
+
+class Modes(Case):
+    def modes(self, *arguments):
+        result = flexboom("modes", *arguments, "--json")
+        self.assert_exit(OK, result)
+        return json.loads(result.stdout)
+
+    def reference(self, column):
+        with open(TESTS / "reference" / "boom_beam_frequencies_hz.csv") as file:
+            return np.array([float(row[column]) for row in csv.DictReader(file) if row["boom"] == "4"])
+
+    def bending(self, document):
+        return np.array([f for f, kind in zip(document["frequencies_hz"], document["kinds"]) if kind == "bending_y"])
+
+    def test_keys(self):
+        document = self.modes(BOOM4)
+        number = (int, float)
+        self.check_types(document, {
+            "frequencies_hz": list, "dofs": int, "elements": int, "mass": number, "backend": str,
+            "residual_max": number, "orthogonality_error": number, "sturm_count": int, "pairs": list,
+            "peak_memory_mb": number,
+            "seconds": {k: number for k in ("mesh", "assemble", "factor", "eigen", "total")}})
+        self.assertEqual(len(document["frequencies_hz"]), 10)
+        self.assertGreaterEqual(document["sturm_count"], 10)
+        # rho L pi d^2 / 4 in double precision
+        self.assertAlmostEqual(document["mass"] / (2840 * 0.302 * math.pi * 0.01**2 / 4), 1, delta=1e-13)
+        self.assertIn([0, 1], document["pairs"])
+
+    def test_frequencies_of_boom_4(self):
+        text = BOOM4.read_text()
+        for shear, column in (("cowper", "bending_Timo_Cowper_k=0.88864142539"),
+                              ("nu-squared", "bending_Timo_nu2_k=0.931359472077")):
+            body = self.folder / "body.toml"
+            body.write_text(re.sub(r'(?m)^shear = "[^"]*"', f'shear = "{shear}"', text))
+            # 1e-9: mesh of 5 elements of order 8; the reference has 13 digits
+            hz = self.bending(self.modes(body, "--count", "17"))[:6]
+            np.testing.assert_allclose(hz, self.reference(column), rtol=1e-9)
+
+    def test_backends_agree(self):
+        for backend in ("arpack", "spectra", "dense"):
+            document = self.modes(BOOM4, "--backend", backend)
+            self.assertEqual(document["backend"], backend)
+            np.testing.assert_allclose(self.bending(document)[:3],
+                                       self.reference("bending_Timo_Cowper_k=0.88864142539")[:3], rtol=1e-9)
+
+    def test_free_body_has_six_rigid_modes(self):
+        hz = self.modes(BOOM4, "--free")["frequencies_hz"]
+        # rigid: omega^2 is round-off of the largest eigenvalue, here below (1e-3 Hz)^2
+        self.assertLess(max(abs(f) for f in hz[:6]), 1e-3 * hz[6])
+        self.assertGreater(hz[6], 400)
+
+    def test_clamp_at_the_other_end_of_a_uniform_boom(self):
+        # the same boom seen from its tip; round-off of the eigen-solve
+        np.testing.assert_allclose(self.modes(BOOM4, "--clamp", "tip")["frequencies_hz"],
+                                   self.modes(BOOM4)["frequencies_hz"], rtol=1e-9)
+
+    def test_material_scales_the_frequencies(self):
+        scaled = self.modes(BOOM4, "--material", "268e9,0.33,2840")["frequencies_hz"]
+        np.testing.assert_allclose(scaled, 2 * np.array(self.modes(BOOM4)["frequencies_hz"]), rtol=1e-9)  # sqrt(E)
+
+
+class Compare(Case):
+    def test_keys_and_verdict(self):
+        result = flexboom("compare", BOOM4, "--json")
+        self.assert_exit(OK, result)
+        document = json.loads(result.stdout)
+        self.assertIs(document["passed"], True)
+        orders = document["bodies"][0]["orders"]
+        self.assertEqual([o["order"] for o in orders], list(range(1, 9)))
+        self.assertLess(max(orders[-1][k] for k in ("frequency", "Ct", "Cr")), 1e-10)
+        self.assertLess(orders[-1]["subspace"], 1e-9)
+        self.assertEqual(len(document["bodies"][0]["modes"]), 10)
+
+    def test_tolerance_that_cannot_be_met(self):
+        result = flexboom("compare", BOOM4, "--tolerance", "1e-20", "--json")
+        self.assert_exit(CHECK_FAILED, result)
+        self.assertIs(json.loads(result.stdout)["passed"], False)
+        self.assertIn("1e-20", result.stderr)
+
+    def test_scene_compares_every_boom(self):
+        result = flexboom("compare", "sport", "--no-transient", "--json")
+        self.assert_exit(OK, result)
+        self.assertEqual([b["name"] for b in json.loads(result.stdout)["bodies"]], list(BOOMS))
+
+
+class Page(html.parser.HTMLParser):
+    """Tags that are open at the end, in order, and what the page would load."""
+    VOID = {"meta", "br", "hr", "img", "link", "input"}
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.seen, self.loads = [], set(), []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        self.seen.add(tag)
+        self.loads += [v for k, v in attributes if k in ("src", "href", "xlink:href", "action", "data")]
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.seen.add(tag)
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open.pop() != tag:
+            raise ValueError(f"</{tag}> closes nothing")
+
+
+class Report(Case):
+    def test_page(self):
+        folder = self.run_sport("--duration", "0.5", "--report")
+        written = (folder / "report.html").read_text()
+        page = Page(written)
+        self.assertEqual((page.open, page.loads), ([], []))
+        self.assertLess({"svg", "table", "canvas"}, page.seen)
+        self.assertEqual(set(re.findall(r"https?://[^\"' ]*", written)) - {"http://www.w3.org/2000/svg"}, set())
+        self.assertNotRegex(written, r"@import|url\(")
+        for boom in BOOMS:
+            self.assertIn(boom, written)
+        self.assertNotRegex(written, r"\bnan\b|\binf\b")
+        (folder / "report.html").unlink()
+        self.assert_exit(OK, flexboom("report", folder))
+        self.assertEqual((folder / "report.html").read_text(), written)
+
+    def test_pictures_are_xml(self):
+        folder = self.run_sport("--duration", "0.5", "--report")
+        for picture in re.findall(r"<svg.*?</svg>", (folder / "report.html").read_text(), re.S):
+            self.assertTrue(list(ElementTree.fromstring(picture).iter("{http://www.w3.org/2000/svg}polyline")))
+
+    def test_names_are_escaped(self):
+        scene = self.folder / "scene.toml"
+        text = (MESHES / "sport.toml").read_text()
+        scene.write_text(text.replace('name = "sport"', 'name = "a<b>&c"'))
+        result = flexboom("run", scene, "--no-budget", "--duration", "0.1", "--report", "--out", self.folder / "out")
+        if result.returncode == INPUT:  # the reader may well refuse such a name
+            self.assertIn("name", result.stderr)
+        else:
+            self.assertNotIn("a<b>", (self.folder / "out" / "report.html").read_text())
+
+    def test_out_folder(self):
+        folder = self.run_sport("--duration", "0.1")
+        result = flexboom("report", folder, "--out", self.folder / "pages", "--json")
+        self.assert_exit(OK, result)
+        self.assertEqual(json.loads(result.stdout)["report"], str(self.folder / "pages" / "report.html"))
+        self.assertTrue((self.folder / "pages" / "report.html").exists())
+
+    def damage(self, good, name, change):
+        shutil.rmtree(self.folder / "bad", ignore_errors=True)
+        shutil.copytree(good, self.folder / "bad")
+        file = self.folder / "bad" / name
+        text = change(file.read_text())
+        file.unlink() if text is None else file.write_text(text)
+
+    def test_damaged_folder(self):
+        good = self.run_sport("--duration", "0.1")
+        for name, change in (
+                ("trajectory.csv", lambda t: None), ("summary.json", lambda t: None), ("scene.toml", lambda t: None),
+                ("trajectory.csv", lambda t: ""), ("trajectory.csv", lambda t: t.splitlines()[0] + "\n"),
+                ("trajectory.csv", lambda t: t[:-30]), ("trajectory.csv", lambda t: t.replace(",0,", ",zero,")),
+                ("trajectory.csv", lambda t: t.replace("sip.angle", "sip.ankle")),
+                ("summary.json", lambda t: ""), ("summary.json", lambda t: t[:200]), ("summary.json", lambda t: "{}"),
+                ("summary.json", lambda t: "[]"), ("summary.json", lambda t: t.replace('"plan"', '"plam"')),
+                ("summary.json", lambda t: re.sub(r'"bodies": \[.*?\n  \],', '"bodies": [1],', t, flags=re.S)),
+                ("scene.toml", lambda t: t[:400])):
+            self.damage(good, name, change)
+            result = flexboom("report", self.folder / "bad")
+            self.assert_exit(INPUT, result)
+            self.assertIn(name, result.stderr)
+            self.assertFalse((self.folder / "bad" / "report.html").exists())
+
+    def test_no_folder(self):
+        self.assert_exit(INPUT, flexboom("report", self.folder / "absent"))
+        self.assertFalse((self.folder / "absent").exists())
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1 and not sys.argv[1].startswith("-"):
+        PROGRAM = sys.argv.pop(1)
+    unittest.main(argv=[sys.argv[0], *sys.argv[1:]])
