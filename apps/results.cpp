@@ -8,11 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <iterator>
 #include <numbers>
 
@@ -24,40 +21,12 @@ using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 using nlohmann::ordered_json;
 
-namespace {
-
-std::string reason() { return errno != 0 ? std::strerror(errno) : "unknown reason"; }
-
-}  // namespace
-
-void write_file(const fs::path& path, const std::string& text) {
-  write_file(path, [&text](std::ostream& out) { out.write(text.data(), static_cast<std::streamsize>(text.size())); });
-}
-
-void write_file(const fs::path& path, const std::function<void(std::ostream&)>& write) {
-  fs::path temporary = path;
-  temporary += ".part";
-  errno = 0;
-  std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
-  write(out);
-  out.close();
-  if (!out) {
-    const std::string why = reason();
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    throw InputError(fmt::format("cannot write {}: {}", path.string(), why));
-  }
-  std::error_code error;
-  fs::rename(temporary, path, error);
-  if (error) throw InputError(fmt::format("cannot write {}: {}", path.string(), error.message()));
-}
-
 void prepare_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   require(!error, fmt::format("cannot make the output folder {}: {}", folder.string(), error.message()));
   const fs::path probe = folder / ".flexboom-probe";
-  write_file(probe, "");
+  write_file(probe, std::string_view());
   fs::remove(probe, error);
 }
 

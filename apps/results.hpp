@@ -1,6 +1,7 @@
 #pragma once
 
 #include "apps/simulate.hpp"
+#include "fem/files.hpp"
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -13,11 +14,6 @@ namespace flexboom {
 
 /// Makes the folder and proves that it can be written to. @throws InputError.
 void prepare_folder(const std::filesystem::path&);
-
-/// Writes a file whole or not at all: to a temporary name first, renamed when every byte is on its way to the disk.
-/// @throws InputError naming the file and the reason (no space, no permission, ...).
-void write_file(const std::filesystem::path&, const std::string& text);
-void write_file(const std::filesystem::path&, const std::function<void(std::ostream&)>& write);
 
 /// trajectory.csv and events.csv, 17 significant digits. The first goes out row by row: as one text it may be
 /// gigabytes.

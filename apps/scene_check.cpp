@@ -26,7 +26,7 @@ using scene_keys::Dimension;
 using toml_reader::Faults;
 
 constexpr double round_off = 1e-12;   // relative
-constexpr double max_rows = 1e7;      // of trajectory.csv
+constexpr double max_rows = 1e6;      // of trajectory.csv
 constexpr int max_modes = 10000;      // per body; more is a typing error
 constexpr int max_elements = 100000;  // per segment; as make_mesh
 

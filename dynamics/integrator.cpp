@@ -161,7 +161,7 @@ void check_options(const IntegratorOptions& o) {
   require(o.tolerance > 0 && o.tolerance <= 0.1, fmt::format("tolerance {:g} must lie in (0, 0.1]", o.tolerance));
   require(o.duration > 0 && std::isfinite(o.duration), fmt::format("duration {:g} s must be positive", o.duration));
   require(o.output_step > 0, fmt::format("output step {:g} s must be positive", o.output_step));
-  require(o.duration / o.output_step < 1e8,
+  require(o.duration / o.output_step <= 1e6,
           fmt::format("{:.3g} output times are too many; choose a longer output step", o.duration / o.output_step));
 }
 
@@ -213,7 +213,8 @@ class Flight {
   }
 
   void write_outputs() {
-    for (double next = output_time(); next <= t_; next = output_time()) {
+    for (double next = output_time(); next <= t_ && !stopped(); next = output_time()) {
+      if (options_.progress && result_.time.size() % 1024 == 0) options_.progress(next, options_.duration);
       if (next == t_) {
         sample_ = y_;
       } else {

@@ -1,13 +1,11 @@
 #include "fem/vtk.hpp"
 
 #include "fem/check.hpp"
+#include "fem/files.hpp"
 
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <fstream>
 #include <iterator>
-#include <system_error>
 
 namespace flexboom {
 namespace {
@@ -89,16 +87,6 @@ void validate(const VtkGrid& grid) {
   validate_fields("cell", grid.cell_data, static_cast<Eigen::Index>(grid.cells.size()));
 }
 
-void write_text(const std::filesystem::path& path, const Text& text) {
-  errno = 0;
-  std::ofstream file(path, std::ios::binary);
-  file.write(text.data(), static_cast<std::streamsize>(text.size()));
-  file.close();
-  if (file) return;
-  const std::string reason = errno ? std::generic_category().message(errno) : "the stream failed";
-  throw InputError(fmt::format("cannot write {}: {}", path.string(), reason));
-}
-
 }  // namespace
 
 void write_vtu(const std::filesystem::path& path, const VtkGrid& grid) {
@@ -118,7 +106,7 @@ void write_vtu(const std::filesystem::path& path, const VtkGrid& grid) {
   append_fields(text, "PointData", grid.point_data);
   append_fields(text, "CellData", grid.cell_data);
   text += "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
-  write_text(path, text);
+  write_file(path, text);
 }
 
 void write_pvd(const std::filesystem::path& path, const std::vector<std::pair<double, std::string>>& files) {
@@ -129,7 +117,7 @@ void write_pvd(const std::filesystem::path& path, const std::vector<std::pair<do
     fmt::format_to(end_of(text), "<DataSet timestep=\"{:.17g}\" part=\"0\" file=\"{}\"/>\n", time, escaped(file));
   }
   text += "</Collection>\n</VTKFile>\n";
-  write_text(path, text);
+  write_file(path, text);
 }
 
 }  // namespace flexboom
