@@ -29,6 +29,7 @@ eq14::Boom uniform_boom(const BodyScene& b) {
   const BeamGeometry& g = b.geometry;
   require(g.segments.size() == 1 && g.attachments.empty(),
           fmt::format("body {}: eq. 14 is a uniform boom: one segment without attachments", b.name));
+  require(b.clamp == "root", fmt::format("body {}: eq. 14 is clamped at its root, not at '{}'", b.name, b.clamp));
   const BeamSegment& s = g.segments.front();
   const Section start = section_of(s.start, s.material.nu, g.shear), end = section_of(s.end, s.material.nu, g.shear);
   require(start.A == end.A && start.Iz == end.Iz, fmt::format("body {}: eq. 14 is a uniform boom: no taper", b.name));

@@ -76,6 +76,8 @@ struct Stopwatch {
 int modes_command(const ModesArguments& a, const CommonOptions& common) {
   require(a.count > 0, "--count must be positive");
   const BodyScene body = body_of(a);
+  if (body.structure == "eq14" && !common.quiet)
+    print_note("note: modes solves finite elements; the closed form of structure = \"eq14\" is in `flexboom compare`");
   Stopwatch watch;
   const Mesh mesh = make_mesh(body.geometry);
   const double mesh_seconds = watch.lap();

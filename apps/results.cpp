@@ -117,9 +117,11 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   j["integrator"] = s.method;
   j["tolerance"] = r.scene.tolerance;
   j["energy_balance"] = s.energy_balance;
-  j["momentum_drift"] = s.momentum_drift;
+  j["momentum_drift"] =
+      r.scene.hub.fixed ? ordered_json() : ordered_json(s.momentum_drift);  // a fixed hub takes momentum
   j["constraint_drift"] = s.constraint_drift;
   j["error_budget"] = budget_json(r.budget);
+  j["accuracy_met"] = r.budget.measured ? ordered_json(r.budget.total() <= r.scene.tolerance) : ordered_json();
   j["plan"] = r.plan;
   j["warnings"] = r.warnings;
   j["bodies"] = bodies_json(r);

@@ -153,9 +153,6 @@ int run_command(const RunArguments& a, const CommonOptions& common) {
   const Scene scene = scene_of(a);
   const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results") / scene.name : common.out;
   prepare_folder(folder);
-  if (!common.quiet)
-    for (const std::string& w : scene.warnings) print_note("warning: " + w);
-
   const InterruptGuard guard;
   const RunResult result = run_with_progress(scene, !common.quiet && !common.json);
   const nlohmann::ordered_json summary = write_results(result, folder);
@@ -169,6 +166,12 @@ int run_command(const RunArguments& a, const CommonOptions& common) {
     print_summary(result, folder);
     if (a.report) fmt::print("report: {}\n", (folder / "report.html").string());
   }
+  if (!common.quiet)
+    for (const std::string& w : result.warnings) print_note("warning: " + w);
+  const IntegrationSummary& s = result.trajectory.summary;
+  if (!is_balanced(s))
+    throw NumericalError(fmt::format("energy balance {:.1e}, momentum drift {:.1e}: the motion in {} is wrong",
+                                     s.energy_balance, s.momentum_drift, folder.string()));
   if (!interrupted.load()) return exit_ok;
   if (!common.quiet)
     print_note(

@@ -229,6 +229,11 @@ void check_eq14(Faults& faults, const std::string& path, const BodyScene& body) 
             "is \"eq14\", the closed form of one uniform segment with mass, clamped at \"root\"; {}; use \"beam\"",
             fault));
   }
+  if (body.directions == "all" && !body.modes_auto && body.modes % 2 != 0)
+    faults.add(join(path, "modes"),
+               fmt::format("is {}; eq. 14 has equal modes in two planes, so with directions = \"all\" "
+                           "it must be even",
+                           body.modes));
 }
 
 /// Freedoms a clamped mesh has left: in all, and for bending along y. An element of order p has p internal freedoms of
@@ -474,7 +479,7 @@ void check_body(const BodyScene& body, const std::string& path, Faults& faults) 
 }
 
 void check_scene(const Scene& scene, Faults& faults) {
-  if (scene.name.empty()) faults.add("name", "is empty; give the scene a name");
+  check_name(faults, "name", scene.name);  // the results folder is called so
   check_times(faults, scene);
   check_integrator(faults, scene);
   check_hub(faults, scene);

@@ -30,7 +30,7 @@ struct ErrorBudget {
   double truncation = 0;
   double time = 0;
   double linearisation = 0;
-  bool measured = false;  // false: the repeats were not run
+  bool measured = false;  // false: the repeats were not run; a part that could not be measured is NaN
   double total() const { return discretisation + truncation + time + linearisation; }
 };
 
@@ -68,6 +68,19 @@ struct RunHooks {
 /// The whole chain. @throws InputError, NumericalError.
 RunResult run_scene(const Scene&, const RunHooks&);
 
+/// Do energy and momenta balance as well as any run must? If not, the motion is wrong whatever the tolerance was.
+bool is_balanced(const IntegrationSummary&);
+
+/// One flight of a scene as it stands.
+struct Run {
+  std::vector<PreparedBody> bodies;
+  Trajectory motion;
+  OutputTable outputs;
+  double prepare_seconds = 0, integrate_seconds = 0;
+};
+/// `max_steps` > 0 bounds its cost: NumericalError above.
+Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
+
 /// Columns of trajectory.csv.
 OutputTable output_table(const Scene&, const System&, const Trajectory&);
 
@@ -79,5 +92,8 @@ struct OutputDifference {
 };
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted);
+
+/// The largest of them.
+double largest(const std::vector<OutputDifference>&);
 
 }  // namespace flexboom

@@ -144,15 +144,20 @@ struct Contacts {
   std::vector<double> settled_since;
 };
 
-/// Stops at the start: closed beyond the threshold; exactly on it, by where the hinge is going.
+/// Stops at the start: closed beyond the threshold; exactly on it, by where the hinge is going, and at rest there by
+/// where it is pushed.
 Contacts contacts_at_start(const System& system, const VectorXd& y) {
   const size_t n = system.appendages().size();
   Contacts c{std::vector<char>(n, 0), std::vector<char>(n, 0), std::vector<double>(n, 0.0),
              std::vector<double>(n, -1.0)};
+  VectorXd y_dot(y.size());
+  system.derivative(y.data(), c.closed, *system.workspace(), y_dot.data());
   for (size_t i = 0; i < n; ++i) {
-    const double gap = system.gap(y.data(), static_cast<int>(i)), rate = system.gap_rate(y.data(), static_cast<int>(i));
+    const int hinge = static_cast<int>(i);
+    const double gap = system.gap(y.data(), hinge), rate = system.gap_rate(y.data(), hinge);
+    const double push = system.gap_rate(y_dot.data(), hinge);
     c.armed[i] = system.appendages()[i].hinge.mechanism.stop_stiffness > 0;
-    c.closed[i] = c.armed[i] && (gap > 0 || (gap == 0 && rate > 0));
+    c.closed[i] = c.armed[i] && (gap > 0 || (gap == 0 && (rate > 0 || (rate == 0 && push > 0))));
   }
   return c;
 }
@@ -253,9 +258,11 @@ class Flight {
       const double rate = system_.gap_rate(y_.data(), hinge);
       double& largest = contacts_.largest_rate[i];
       largest = std::max(largest, std::abs(rate));
-      if (crossed_[i] != 0) {
-        const bool contact = crossed_[i] > 0;
-        y_[system_.layout().body[i]] = 0;  // on the stop, exactly: the root is good to round-off of t
+      const bool slipped = slipped_through(i);
+      if (crossed_[i] != 0 || slipped) {
+        double& gap = y_[system_.layout().body[i]];
+        const bool contact = slipped ? gap > 0 : crossed_[i] > 0;
+        if (!slipped) gap = 0;  // on the stop, exactly: the root is good to round-off of t
         contacts_.closed[i] = contact;
         result_.events.push_back({t_, hinge, contact, rate});
         changed = true;
@@ -266,6 +273,15 @@ class Flight {
       }
     }
     return changed;
+  }
+
+  /// Is the gap on the wrong side of the flag, with no crossing found? A root finder sees no sign change where the gap
+  /// starts at zero and stays there for a while.
+  bool slipped_through(size_t i) const {
+    if (!contacts_.armed[i] || crossed_[i] != 0) return false;
+    const double gap = system_.gap(y_.data(), static_cast<int>(i));
+    const double noise = scales_.error().tolerance * scales_.error().scale[system_.layout().body[i]];
+    return contacts_.closed[i] ? gap < -noise : gap > noise;
   }
 
   void settle(size_t i) {

@@ -100,6 +100,8 @@ TEST_P(EveryMethod, FlexibleBoomOnAFixedHubMeetsTheReference) {
       ASSERT_LT(k, r.events.size());
       EXPECT_NEAR(r.events[k++].time, std::stod(row[4]), 1e-9);
     }
+    EXPECT_EQ(k, 11U) << zeta;
+    EXPECT_EQ(r.events.size(), k) << zeta;
   }
 }
 
@@ -183,6 +185,36 @@ TEST(Integrator, StartsBeyondTheStopAndExactlyOnIt) {
   EXPECT_FALSE(integrate(system, system.pack(s), o).events.front().contact);
   s.rate[0] = -1;
   EXPECT_TRUE(integrate(system, system.pack(s), o).events.front().contact);
+}
+
+/// The spring presses the boom against a stop that it starts on, at rest: it must sink in by tau / k and swing there,
+/// not through.
+TEST(Integrator, StopHoldsABoomThatIsPressedAgainstItFromTheStart) {
+  Appendage a = boom_2(0).appendages()[0];
+  a.hinge.mechanism.rest = 1.8;
+  a.hinge.mechanism.damping = 0;
+  const HingeMechanism& m = a.hinge.mechanism;
+  const System system(ReducedBody{}, {a}, true);
+  const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2})), {});
+  const double depth = m.stiffness * (m.rest - m.threshold) / (m.stiffness + m.stop_stiffness);
+  double deepest = 0;
+  for (const VectorXd& y : r.y) deepest = std::max(deepest, y[0]);
+  EXPECT_NEAR(deepest, 2 * depth, 0.01 * depth);  // 1 - cos(omega t), on the output grid
+  EXPECT_LT(r.summary.energy_balance, 1e-5);
+}
+
+/// The hub turns: the boom lifts off or sinks in only after the start, from exact rest on the stop.
+TEST(Integrator, StopHoldsABoomOnASpinningHub) {
+  Appendage a = boom_2(0).appendages()[0];
+  a.hinge.mechanism.stop_stiffness = 1000;
+  const System system(rigid_body("hub", 8.5, Vector3d::Zero(), 0.1 * Matrix3d::Identity()), {a});
+  State s = system.at_rest({pi / 2});
+  for (const double spin : {1.0, -1.0}) {
+    s.omega = Vector3d(0.3, 0.2, spin);
+    const Trajectory r = integrate(system, system.pack(s), {});
+    EXPECT_LT(r.summary.energy_balance, 1e-6) << spin;
+    for (const VectorXd& y : r.y) EXPECT_LT(y[0], 1e-4) << spin;
+  }
 }
 
 TEST(Integrator, SettledHingesAreReportedAndNoLongerLogged) {

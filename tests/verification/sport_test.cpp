@@ -169,6 +169,63 @@ TEST(Sport, ErrorBudgetBoundsTheErrorOfARunAgainstABetterOne) {
   EXPECT_LT(error, 1.5e-5);  // the tenth of the tolerance it was compared with has an error of its own
 }
 
+TEST(Sport, BudgetCountsWhatBendsOutOfTheHingePlane) {
+  Scene scene = sport("eq14");
+  scene.duration = 0.5;
+  scene.tolerance = 1e-6;
+  scene.error_budget = true;
+  const RunResult plane = run_scene(scene, {});
+  scene.error_budget = false;
+  for (BodyScene& b : scene.bodies) b.directions = "all", b.modes = 4;
+  const RunResult both = run_scene(scene, {});
+  double left_out = 0;
+  for (const OutputDifference& d : compare_outputs(plane.outputs, both.outputs, {}))
+    if (!d.name.ends_with(".q")) left_out = std::max(left_out, d.error);
+  EXPECT_GT(left_out, 1e-4);
+  EXPECT_GT(plane.budget.truncation, 0.9 * left_out);
+  EXPECT_TRUE(std::any_of(plane.warnings.begin(), plane.warnings.end(),
+                          [](const std::string& w) { return w.starts_with("the accuracy wanted"); }));
+}
+
+TEST(Sport, ModesChosenAreTheFewestThatReachTheTolerance) {
+  Scene scene = sport("eq14");
+  scene.duration = 0.5;
+  scene.outputs = {"hub.rotation"};
+  scene.tolerance = 1e-3;
+  const auto chosen = [&] {
+    for (BodyScene& b : scene.bodies) b.modes_auto = true;
+    return run_scene(scene, {}).scene.bodies[0].modes;
+  };
+  const int modes = chosen();
+  const auto error_with = [&](int n) {
+    for (BodyScene& b : scene.bodies) b.modes_auto = false, b.modes = n;
+    const OutputTable few = run_scene(scene, {}).outputs;
+    for (BodyScene& b : scene.bodies) b.modes = n + 1;
+    return largest(compare_outputs(few, run_scene(scene, {}).outputs, scene.outputs));
+  };
+  EXPECT_LE(error_with(modes), scene.tolerance);
+  if (modes > 1) {
+    EXPECT_GT(error_with(modes - 1), scene.tolerance);
+  }
+  scene.tolerance = 1e-9;  // out of reach of the most that are tried
+  EXPECT_EQ(chosen(), 4);
+}
+
+TEST(Sport, BudgetOfTheHighestOrderHalvesTheElements) {
+  Scene scene = sport("beam");
+  scene.duration = 0.05;
+  scene.error_budget = true;
+  scene.tolerance = 1e-4;
+  for (BodyScene& b : scene.bodies) b.geometry.order = 12;
+  EXPECT_LT(run_scene(scene, {}).budget.discretisation, 1e-4);
+}
+
+TEST(Compare, RotationsPastHalfATurnDoNotJump) {
+  const OutputTable a{{"hub.rotation.x", "hub.rotation.y", "hub.rotation.z"}, Eigen::RowVector3d(0, 0, pi - 1e-6)};
+  const OutputTable b{a.names, Eigen::RowVector3d(0, 0, -(pi - 1e-6))};
+  EXPECT_NEAR(compare_outputs(a, b, {}).at(0).error, 2e-6 / pi, 1e-12);
+}
+
 Scene conservative(double duration) {
   Scene scene = sport("eq14");
   scene.tolerance = 1e-10;
