@@ -344,11 +344,11 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks) {
   Run run = run_once(r.scene, hooks);
   describe(r.scene, run, r.plan);
   r.warnings = r.scene.warnings;
-  // The repeats cost about four times the run; a long one is not repeated unasked.
+  // The repeats cost many times the run; a long one is not repeated.
   constexpr long worth_repeating = 2'000'000;
   const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating;
   if (r.scene.error_budget && !repeat)
-    r.plan.push_back(fmt::format("error budget: not measured, its repeats would cost four times {} evaluations",
+    r.plan.push_back(fmt::format("error budget: not measured, its repeats would cost many times {} evaluations",
                                  run.motion.summary.rhs_evaluations));
   if (r.scene.error_budget && repeat && !run.motion.summary.interrupted) {
     const auto start = std::chrono::steady_clock::now();
