@@ -23,6 +23,8 @@ struct Place {
   int column = 0;
 };
 
+struct Entry;
+
 /// A parsed value. Tables keep the order of the file.
 struct Value {
   enum class Kind { boolean, integer, number, text, date, array, table };
@@ -32,9 +34,29 @@ struct Value {
   std::int64_t integer = 0;
   double number = 0;  // also set for an integer
   std::string text;
-  std::vector<Value> items;                            // of an array
-  std::vector<std::pair<std::string, Value>> entries;  // of a table
+  std::vector<Value> items;    // of an array
+  std::vector<Entry> entries;  // of a table
+
+  Value();
+  ~Value();
+  Value(const Value&);
+  Value(Value&&) noexcept;
+  Value& operator=(const Value&);
+  Value& operator=(Value&&) noexcept;
 };
+
+struct Entry {
+  std::string first;  // the key
+  Value second;
+};
+
+// A value holds entries that hold values: its members can only be made once both are known.
+inline Value::Value() = default;
+inline Value::~Value() = default;
+inline Value::Value(const Value&) = default;
+inline Value::Value(Value&&) noexcept = default;
+inline Value& Value::operator=(const Value&) = default;
+inline Value& Value::operator=(Value&&) noexcept = default;
 
 /// @throws InputError `file:line:column: what is wrong` for text that is not TOML or not UTF-8.
 Value parse(const std::string& text, const std::string& file);
