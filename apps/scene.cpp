@@ -25,7 +25,6 @@ using toml_reader::Faults;
 using toml_reader::TableReader;
 using toml_reader::Value;
 
-constexpr double pi = std::numbers::pi;
 constexpr double repairable_skew = 0.02;       // of the largest entry of an inertia; misprints, not other matrices
 constexpr double repairable_direction = 1e-6;  // of a direction: rounding by hand
 constexpr size_t max_file_size = 16 << 20;     // [bytes]; no scene, but whatever was taken for one
