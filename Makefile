@@ -5,8 +5,8 @@
 JOBS ?= $(shell nproc)
 
 packages := g++ cmake ninja-build \
-  libeigen3-dev libsuitesparse-dev libopenblas-dev libarpack2-dev libspectra-dev libsundials-dev \
-  libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libfmt-dev libgtest-dev libbenchmark-dev \
+  libeigen3-dev libsuitesparse-dev libmetis-dev libopenblas-dev libmumps-seq-dev libarpack2-dev libspectra-dev libsundials-dev \
+  libcli11-dev libtomlplusplus-dev libpugixml-dev zlib1g-dev nlohmann-json3-dev libfmt-dev libgtest-dev libbenchmark-dev \
   python3 python3-numpy python3-scipy python3-meshio python3-vtk9 python3-h5py
 format tidy: packages += clang-format clang-tidy
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "apps/model.hpp"
+
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -41,12 +43,22 @@ struct RunArguments {
 
 struct ModesArguments {
   std::string model;
-  int count = 10;
-  std::string backend = "arpack";
-  std::optional<std::string> clamp;     // node set; the body's own by default
-  std::optional<std::string> material;  // "E,nu,rho"
-  bool free = false;
+  ModelOptions options;
+  std::optional<int> count;            // what the file asks for, or 10
+  std::optional<std::string> backend;  // what the file asks for, or "auto"
+  std::string verify = "auto";         // Sturm count: "auto" where it is cheap, "sturm" always, "basic" never
   std::filesystem::path vtu;
+};
+
+struct MeshArguments {
+  std::string body;
+  ModelOptions options;
+  std::filesystem::path file;
+};
+
+struct BenchArguments {
+  std::string what;
+  double longest = 60;  // [s] per row; larger models are left out
 };
 
 struct CompareArguments {
@@ -61,6 +73,8 @@ struct CompareArguments {
 int run_command(const RunArguments&, const CommonOptions&);
 int check_command(const std::string& scene, const CommonOptions&);
 int modes_command(const ModesArguments&, const CommonOptions&);
+int mesh_command(const MeshArguments&, const CommonOptions&);
+int bench_command(const BenchArguments&, const CommonOptions&);
 int compare_command(const CompareArguments&, const CommonOptions&);
 int report_command(const std::filesystem::path& folder, const CommonOptions&);
 

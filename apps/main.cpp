@@ -1,5 +1,6 @@
 #include "apps/commands.hpp"
 #include "apps/version.hpp"
+#include "fem/blas_threads.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
@@ -24,6 +25,8 @@ struct CommandLine {
   CommonOptions common;
   RunArguments run;
   ModesArguments modes;
+  MeshArguments mesh;
+  BenchArguments bench;
   CompareArguments compare;
   std::string checked;
   std::filesystem::path reported;
@@ -34,6 +37,8 @@ struct CommandLine {
     add_run();
     add_check();
     add_modes();
+    add_mesh();
+    add_bench();
     add_compare();
     add_report();
   }
@@ -72,14 +77,40 @@ struct CommandLine {
 
   void add_modes() {
     CLI::App* c = command("modes", "Eigenfrequencies and mode shapes of a body");
-    c->add_option("MODEL", modes.model, "Body file (.toml)")->required();
-    c->add_option("--count", modes.count, "Number of modes");
-    c->add_option("--backend", modes.backend, "Eigen-solver: arpack, spectra or dense");
-    c->add_option("--clamp", modes.clamp, "Node set that is fixed (default: the body's)");
-    c->add_option("--material", modes.material, "E,nu,rho of every segment, instead of the file's");
-    c->add_flag("--free", modes.free, "No clamp")->excludes("--clamp");
+    c->add_option("MODEL", modes.model, "Body file (.toml) or mesh (.inp, .msh, .bdf, .vtu, .step, .geo)")->required();
+    c->add_option("--count", modes.count, "Number of modes (default: what the file asks for, or 10)");
+    c->add_option("--backend", modes.backend, "Eigen-solver: auto, arpack, block, spectra or dense");
+    c->add_option("--verify", modes.verify, "Proof that no mode is missed: auto (where cheap), sturm, basic")
+        ->check(CLI::IsMember({"auto", "sturm", "basic"}));
+    c->add_option("--clamp", modes.options.clamp,
+                  "Node set that is fixed (default: the body's, or the file's supports)");
+    c->add_flag("--free", modes.options.free, "No clamp, no supports")->excludes("--clamp");
     c->add_option("--vtu", modes.vtu, "Write the shapes to this .vtu file");
+    add_model_options(c, modes.options);
     c->callback([this] { action = [this] { return modes_command(modes, common); }; });
+  }
+
+  void add_mesh() {
+    CLI::App* c = command("mesh", "geometry -> mesh file; or one mesh format into another");
+    c->add_option("BODY", mesh.body, "Body file (.toml) or mesh")->required();
+    c->add_option("-o,--output", mesh.file, "Mesh to write: .vtu, .msh or .inp")->required();
+    add_model_options(c, mesh.options);
+    c->callback([this] { action = [this] { return mesh_command(mesh, common); }; });
+  }
+
+  void add_bench() {
+    CLI::App* c = command("bench", "speed against error, measured: modes");
+    c->add_option("WHAT", bench.what, "modes")->required()->check(CLI::IsMember({"modes"}));
+    c->add_option("--longest", bench.longest, "Leave out models that would take longer than this [s]");
+    c->callback([this] { action = [this] { return bench_command(bench, common); }; });
+  }
+
+  static void add_model_options(CLI::App* c, ModelOptions& options) {
+    c->add_option("--material", options.material, "E,nu,rho of everything, instead of the file's");
+    c->add_option("--structure", options.structure, "Of a body file: beam or solid");
+    c->add_option("--element", options.element, "Of a solid body: hex, hex8, hex20, ...");
+    c->add_option("--order", options.order, "Polynomial order of beams and of hex");
+    c->add_option("--accuracy", options.accuracy, "Relative error wanted in the frequencies of a solid body");
   }
 
   void add_compare() {
@@ -121,6 +152,7 @@ int run_line(int argc, char** argv) {
     return code;
   }
   Eigen::setNbThreads(line.common.threads);
+  set_blas_threads(line.common.threads);
   const int code = line.action();
   flush_stdout();
   return code;
@@ -129,6 +161,7 @@ int run_line(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  restart_with_better_blas_kernels(argv);
   std::signal(SIGPIPE, SIG_IGN);
 #ifdef SIGXFSZ
   std::signal(SIGXFSZ, SIG_IGN);  // a full quota is an error of write(), not a death

@@ -1,7 +1,6 @@
 #include "apps/commands.hpp"
-#include "apps/results.hpp"
-#include "apps/scene.hpp"
 #include "fem/check.hpp"
+#include "fem/mesh_file.hpp"
 #include "fem/vtk.hpp"
 #include "reduction/inertia_invariants.hpp"
 
@@ -10,7 +9,6 @@
 #include <nlohmann/json.hpp>
 
 #include <chrono>
-#include <cstdio>
 #include <numbers>
 
 namespace flexboom {
@@ -19,115 +17,156 @@ using nlohmann::ordered_json;
 
 namespace {
 
-Material parse_material(const std::string& text) {
-  Material m;
-  char rest = 0;
-  require(std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &m.E, &m.nu, &m.rho, &rest) == 3,
-          fmt::format("--material: '{}' is not E,nu,rho, e.g. 67e9,0.33,2840", text));
-  m.validate();
-  return m;
-}
+constexpr int default_count = 10;
 
-BodyScene body_of(const ModesArguments& a) {
-  const std::string extension = std::filesystem::path(a.model).extension().string();
-  require(extension == ".toml",
-          fmt::format("{}: this version reads bodies from .toml files, not '{}'", a.model, extension));
-  BodyScene body = read_body(a.model);
-  if (a.material)
-    for (BeamSegment& s : body.geometry.segments) s.material = parse_material(*a.material);
-  if (a.clamp) body.clamp = *a.clamp;
-  return body;
-}
-
+/// Largest resident memory of this process so far [MB].
 double peak_memory_mb() {
   rusage usage = {};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-/// Every shape as a field of displacement over the boom's centre line.
-void write_shapes(const std::filesystem::path& file, const ReducedBody& body) {
-  VtkGrid grid;
-  grid.points = body.display.points;
-  constexpr int vtk_line = 3;  // two points: meshio skips polylines
-  for (const std::vector<int>& line : body.display.lines)
-    for (size_t k = 0; k + 1 < line.size(); ++k) grid.cells.push_back({vtk_line, {line[k], line[k + 1]}});
-  for (int k = 0; k < body.n(); ++k) {
-    Eigen::MatrixXd field(3, grid.points.cols());
-    for (Eigen::Index i = 0; i < field.cols(); ++i) field.col(i) = body.display.S[static_cast<size_t>(i)].col(k);
-    grid.point_data.emplace_back(fmt::format("mode_{:03d}_{}", k + 1, body.coordinates[static_cast<size_t>(k)].kind),
-                                 field);
+/// Wall time and peak memory of the stages, one after another.
+class Stages {
+ public:
+  void end(const std::string& name) {
+    const auto now = std::chrono::steady_clock::now();
+    const double elapsed = std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+    total_ += elapsed;
+    seconds_[name] = elapsed;
+    memory_[name] = peak_memory_mb();
   }
-  write_vtu(file, grid);
+  double seconds(const std::string& name) const { return seconds_.at(name); }
+  double total() const { return total_; }
+  const ordered_json& memory() const { return memory_; }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  double total_ = 0;
+  ordered_json seconds_, memory_;
+};
+
+/// Points of the mesh and every shape as a field of displacement over them. Beams are drawn along their deformed axis.
+VtkGrid shapes_grid(const Model& model, const Assembly& assembly, const ModalBasis& basis) {
+  const auto is_beam = [](const Element& e) { return type_of(e).shape == Shape::line; };
+  const auto field_name = [&basis](int k) {
+    return fmt::format("mode_{:03d}_{}", k + 1, name_of(basis.kind[static_cast<size_t>(k)]));
+  };
+  const auto modes = static_cast<int>(basis.Phi.cols());
+  if (!std::ranges::all_of(model.mesh.elements, is_beam)) {
+    VtkGrid grid = vtk_grid(model.mesh);
+    for (int k = 0; k < modes; ++k) {
+      const Eigen::Matrix3Xd nodal = nodal_displacement(model.mesh, assembly.dofs, basis.Phi.col(k));
+      grid.point_data.emplace_back(field_name(k), vtk_point_values(model.mesh, nodal));
+    }
+    return grid;
+  }
+  const DisplayShape display = reduce(model.mesh, assembly, basis, model.name).display;
+  VtkGrid grid;
+  grid.points = display.points;
+  constexpr int vtk_line = 3;  // two points: meshio skips polylines
+  for (const std::vector<int>& line : display.lines) {
+    for (size_t k = 0; k + 1 < line.size(); ++k) grid.cells.push_back({vtk_line, {line[k], line[k + 1]}});
+  }
+  for (int k = 0; k < modes; ++k) {
+    Eigen::MatrixXd field(3, grid.points.cols());
+    for (Eigen::Index i = 0; i < field.cols(); ++i) field.col(i) = display.S[static_cast<size_t>(i)].col(k);
+    grid.point_data.emplace_back(field_name(k), field);
+  }
+  return grid;
 }
 
-struct Stopwatch {
-  std::chrono::steady_clock::time_point last = std::chrono::steady_clock::now();
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double s = std::chrono::duration<double>(now - last).count();
-    last = now;
-    return s;
+double mass_of(const Mesh& mesh, const Assembly& assembly) {
+  return quadratic_form(assembly.M, rigid_motions(mesh, assembly.dofs).leftCols<1>())(0, 0);
+}
+
+ordered_json json_of(const Model& model, const Assembly& assembly, const ModalBasis& basis, const Stages& stages) {
+  const EigenSummary& s = basis.summary;
+  const Eigen::VectorXd hz = basis.omega / (2 * std::numbers::pi);
+  std::vector<std::string_view> kinds;
+  for (const ModeKind k : basis.kind) kinds.push_back(name_of(k));
+  return {{"frequencies_hz", std::vector<double>(hz.begin(), hz.end())},
+          {"kinds", kinds},
+          {"dofs", basis.unknowns},
+          {"elements", model.mesh.elements.size()},
+          {"mass", mass_of(model.mesh, assembly)},
+          {"rigid_freedoms", basis.rigid_freedoms},
+          {"seconds",
+           {{"mesh", stages.seconds("mesh")},
+            {"assemble", stages.seconds("assemble")},
+            {"analyse", s.analyse_seconds},
+            {"factor", s.factor_seconds},
+            {"eigen", s.eigen_seconds},
+            {"verify", s.verify_seconds},
+            {"modes", stages.seconds("modes")},
+            {"total", stages.total()}}},
+          {"memory_mb",
+           {{"mesh", stages.memory().at("mesh")},
+            {"assemble", stages.memory().at("assemble")},
+            {"modes", stages.memory().at("modes")},
+            {"factor", s.factor_bytes / (1 << 20)}}},
+          {"backend", s.backend},
+          {"ordering", s.ordering},
+          {"factor_entries", s.factor_nonzeros},
+          {"solves", s.solves},
+          {"shift", s.sigma},
+          {"residual_max", s.residual_max},
+          {"orthogonality_error", s.orthogonality_error},
+          {"sturm_count", s.sturm_checked ? ordered_json(s.sturm_count) : ordered_json(nullptr)},
+          {"proof", s.proof},
+          {"pairs", s.pairs},
+          {"notes", model.notes},
+          {"peak_memory_mb", peak_memory_mb()}};
+}
+
+void print_table(const Model& model, const Assembly& assembly, const ModalBasis& basis, const Stages& stages) {
+  const EigenSummary& s = basis.summary;
+  fmt::print("{}: {} elements, {} unknowns, mass {:.9g} kg\n", model.name, model.mesh.elements.size(), basis.unknowns,
+             mass_of(model.mesh, assembly));
+  for (Eigen::Index k = 0; k < basis.omega.size(); ++k) {
+    fmt::print("{:4}  {:18.10f} Hz  {}\n", k + 1, basis.omega(k) / (2 * std::numbers::pi),
+               name_of(basis.kind[static_cast<size_t>(k)]));
   }
-};
+  print_note(fmt::format("{}: residual {:.1e}, orthogonality {:.1e}; {}", s.backend, s.residual_max,
+                         s.orthogonality_error, s.proof));
+  print_note(
+      fmt::format("{:.3f} s: mesh {:.3f}, assembly {:.3f}, analysis {:.3f}, factor {:.3f}, modes {:.3f}, "
+                  "verification {:.3f}; {:.0f} MB",
+                  stages.total(), stages.seconds("mesh"), stages.seconds("assemble"), s.analyse_seconds,
+                  s.factor_seconds, s.eigen_seconds, s.verify_seconds, peak_memory_mb()));
+}
+
+EigenOptions eigen_options(const ModesArguments& a, const Model& model) {
+  EigenOptions options;
+  options.num_modes = a.count.value_or(model.modes.value_or(default_count));
+  options.backend = a.backend.value_or(model.backend.value_or("auto"));
+  options.sturm = a.verify == "sturm"   ? SturmPolicy::always
+                  : a.verify == "basic" ? SturmPolicy::never
+                                        : SturmPolicy::when_cheap;
+  return options;
+}
 
 }  // namespace
 
 int modes_command(const ModesArguments& a, const CommonOptions& common) {
-  require(a.count > 0, "--count must be positive");
-  const BodyScene body = body_of(a);
-  if (body.structure == "eq14" && !common.quiet)
-    print_note("note: modes solves finite elements; the closed form of structure = \"eq14\" is in `flexboom compare`");
-  Stopwatch watch;
-  const Mesh mesh = make_mesh(body.geometry);
-  const double mesh_seconds = watch.lap();
-  const Assembly assembly = assemble(mesh);
-  const double assemble_seconds = watch.lap();
-  EigenOptions options;
-  options.num_modes = a.count;
-  options.backend = a.backend;
-  const std::vector<int> clamp = a.free ? std::vector<int>{} : node_set(mesh, body.clamp);
-  const ModalBasis basis = clamped_modes(mesh, assembly, clamp, options);
-  const double eigen_seconds = watch.lap();
-  const ReducedBody reduced = reduce(mesh, assembly, basis, body.name);
-  if (!a.vtu.empty()) write_shapes(a.vtu, reduced);
-
-  const EigenSummary& s = basis.summary;
-  const auto dofs = free_dofs(assembly.dofs, clamp).size();
-  const Eigen::VectorXd hz = basis.omega / (2 * std::numbers::pi);
-  if (common.json) {
-    std::vector<std::string_view> kinds;
-    for (const ModeKind k : basis.kind) kinds.push_back(name_of(k));
-    ordered_json j = {{"frequencies_hz", std::vector<double>(hz.begin(), hz.end())},
-                      {"kinds", kinds},
-                      {"dofs", dofs},
-                      {"elements", mesh.elements.size()},
-                      {"mass", reduced.m},
-                      {"seconds",
-                       {{"mesh", mesh_seconds},
-                        {"assemble", assemble_seconds},
-                        {"factor", s.factor_seconds},
-                        {"eigen", s.eigen_seconds},
-                        {"total", mesh_seconds + assemble_seconds + eigen_seconds}}},
-                      {"backend", s.backend},
-                      {"shift", s.sigma},
-                      {"residual_max", s.residual_max},
-                      {"orthogonality_error", s.orthogonality_error},
-                      {"sturm_count", s.sturm_count},
-                      {"pairs", s.pairs},
-                      {"peak_memory_mb", peak_memory_mb()}};
-    fmt::print("{}\n", j.dump(2));
-    return exit_ok;
+  require(!a.count || *a.count > 0, "--count must be positive");
+  Stages stages;
+  Model model = load_model(a.model, a.options);
+  stages.end("mesh");
+  if (!common.quiet) {
+    for (const std::string& note : model.notes) print_note("note: " + note);
   }
-  if (common.quiet) return exit_ok;
-  fmt::print("{}: {} elements, {} unknowns, mass {:.9g} kg\n", body.name, mesh.elements.size(), dofs, reduced.m);
-  for (Eigen::Index k = 0; k < hz.size(); ++k)
-    fmt::print("{:4}  {:18.10f} Hz  {}\n", k + 1, hz[k], name_of(basis.kind[static_cast<size_t>(k)]));
-  print_note(
-      fmt::format("{}: residual {:.1e}, orthogonality {:.1e}, Sturm count {} below {:.6g} Hz: no mode missed; {:.3f} s",
-                  s.backend, s.residual_max, s.orthogonality_error, s.sturm_count,
-                  std::sqrt(std::max(0.0, s.sturm_shift)) / (2 * std::numbers::pi),
-                  mesh_seconds + assemble_seconds + eigen_seconds));
+  const Assembly assembly = assemble(model.mesh, common.threads);
+  stages.end("assemble");
+  const ModalBasis basis = clamped_modes(model.mesh, assembly, model.clamp, eigen_options(a, model), common.threads);
+  stages.end("modes");
+  if (!a.vtu.empty()) write_vtu(a.vtu, shapes_grid(model, assembly, basis));
+  if (common.json) {
+    fmt::print("{}\n", json_of(model, assembly, basis, stages).dump(2));
+  } else if (!common.quiet) {
+    print_table(model, assembly, basis, stages);
+  }
   return exit_ok;
 }
 

@@ -122,9 +122,15 @@ std::string svg(const Plot& p) {
       if ((p.log_x && c.x[k] <= 0) || (p.log_y && c.y[k] <= 0)) continue;
       s += fmt::format("{:.1f},{:.1f} ", px(ax.fraction(c.x[k])), py(ay.fraction(c.y[k])));
     }
+    s += "\"/>\n";
+    for (size_t k = 0; p.markers && k < c.x.size(); ++k) {
+      if ((p.log_x && c.x[k] <= 0) || (p.log_y && c.y[k] <= 0)) continue;
+      s += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\" fill=\"{}\"/>\n", px(ax.fraction(c.x[k])),
+                       py(ay.fraction(c.y[k])), colour);
+    }
     const double y = top + 10 + 18 * static_cast<double>(i);
     s += fmt::format(
-        "\"/>\n<path d=\"M{0:.0f} {1:.0f}h18\" stroke=\"{2}\" stroke-width=\"2\"{6}/><text x=\"{3:.0f}\" "
+        "<path d=\"M{0:.0f} {1:.0f}h18\" stroke=\"{2}\" stroke-width=\"2\"{6}/><text x=\"{3:.0f}\" "
         "y=\"{4:.0f}\">{5}</text>\n",
         left + w + 8, y, colour, left + w + 30, y + 4, escaped(c.name), i % 2 ? dashes : "");
   }

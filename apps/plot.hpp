@@ -15,6 +15,7 @@ struct Plot {
   std::vector<Curve> curves;
   int width = 760, height = 280;
   bool log_x = false, log_y = false;
+  bool markers = false;  // a dot at every value
 };
 
 /// Text that can stand between the tags of XML and HTML.

@@ -164,6 +164,30 @@ BeamGeometry read_geometry(TableReader& table, Reading& reading) {
   return boom;
 }
 
+SolidOptions read_solid(TableReader& table) {
+  SolidOptions solid;
+  auto keys = table.table("solid");
+  if (!keys) return solid;
+  solid.element = keys->text("element", solid.element);
+  solid.accuracy = keys->number("accuracy", solid.accuracy);
+  solid.order = keys->integer("order", solid.order);
+  solid.slit = keys->number("slit", solid.slit);
+  if (auto grading = keys->table("grading")) {
+    SolidGrading& g = solid.grading;
+    g.sectors = grading->integer("sectors", g.sectors);
+    g.rings = grading->integer("rings", g.rings);
+    g.long_elements = grading->integer("long_elements", g.long_elements);
+    g.end_layers = grading->integer("end_layers", g.end_layers);
+    g.first_layer = grading->number("first_layer", g.first_layer);
+    g.growth = grading->number("growth", g.growth);
+    g.corner_levels = grading->integer("corner_levels", g.corner_levels);
+    g.factor = grading->number("factor", g.factor);
+    grading->reject_unknown();
+  }
+  keys->reject_unknown();
+  return solid;
+}
+
 DampingRule read_damping(TableReader& table, const DampingRule& otherwise) {
   auto damping = table.table("damping");
   if (!damping) return otherwise;
@@ -201,6 +225,7 @@ BodyScene read_whole_body(TableReader& table, Reading& reading) {
   body.name = table.text("name");
   read_model(table, body);
   body.geometry = read_geometry(table, reading);
+  body.solid = read_solid(table);
   return body;
 }
 

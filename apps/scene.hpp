@@ -1,7 +1,7 @@
 #pragma once
 
 #include "dynamics/hinge.hpp"
-#include "fem/mesh.hpp"
+#include "fem/solid_boom.hpp"
 #include "reduction/reduced_body.hpp"
 
 #include <Eigen/Core>
@@ -16,12 +16,14 @@ namespace flexboom {
 /// A flexible boom as a file describes it (format "flexboom-body-1", or a [[bodies]] entry of a scene).
 struct BodyScene {
   std::string name;
-  std::string structure = "beam";  // "beam": finite elements; "eq14": closed form (one uniform segment only); "rigid"
-  std::string clamp = "root";      // node set that is fixed
-  int modes = 2;                   // elastic coordinates kept
-  bool modes_auto = false;         // modes = "auto": chosen from the accuracy wanted
+  std::string structure =
+      "beam";  // "beam", "solid": finite elements; "eq14": closed form (one uniform segment only); "rigid"
+  std::string clamp = "root";              // node set that is fixed
+  int modes = 2;                           // elastic coordinates kept
+  bool modes_auto = false;                 // modes = "auto": chosen from the accuracy wanted
   std::string directions = "hinge-plane";  // modes that count: "hinge-plane" (bending along y) or "all"
   BeamGeometry geometry;
+  SolidOptions solid;              // [solid], how structure = "solid" is meshed
   DampingRule damping;             // none by default
   std::string backend = "arpack";  // eigen-solver
 };

@@ -1,8 +1,8 @@
 #include "apps/scene.hpp"
 #include "apps/scene_keys.hpp"
 #include "dynamics/integrator.hpp"
-#include "fem/assembly.hpp"
 #include "fem/check.hpp"
+#include "fem/constraints.hpp"
 #include "reduction/eigen_solver.hpp"
 
 #include <fmt/format.h>
@@ -62,6 +62,12 @@ template <class Table>
 std::vector<std::string_view> names_of(const Table& table) {
   std::vector<std::string_view> names;
   for (const auto& row : table) names.push_back(row.name);
+  return names;
+}
+
+std::vector<std::string_view> backend_names() {
+  std::vector<std::string_view> names = names_of(eigen_backends());
+  names.push_back("auto");
   return names;
 }
 
@@ -245,7 +251,7 @@ struct Unknowns {
 
 Unknowns count_unknowns(const Mesh& mesh, const std::vector<int>& clamp) {
   Unknowns unknowns;
-  unknowns.all = static_cast<int>(free_dofs(assemble(mesh).dofs, clamp).size());
+  unknowns.all = flexboom::unknowns(mesh, assemble(mesh).dofs, clamp).count;
   unknowns.hinge_plane = 2 * static_cast<int>(mesh.nodes.cols() - std::ssize(clamp));
   for (const Element& element : mesh.elements) {
     const int internal = element_types()[static_cast<size_t>(element.type)].internal_freedoms(mesh, element);
@@ -278,6 +284,7 @@ void check_model(Faults& faults, const std::string& path, const BodyScene& body)
       section_of(segment.end, segment.material.nu, rule);
     }
     if (body.structure == "beam" && !body.modes_auto) check_mode_count(faults, path, body);
+    if (body.structure == "solid") chosen(body.geometry, body.solid);
   } catch (const InputError& error) {
     faults.add(join(path, "segments"), error.what());
   }
@@ -461,13 +468,15 @@ void check_connections(Faults& faults, const Scene& scene) {
 
 void check_body(const BodyScene& body, const std::string& path, Faults& faults) {
   check_name(faults, join(path, "name"), body.name);
-  if (body.structure == "solid") {
-    faults.add(join(path, "structure"),
-               "\"solid\" is not available in this version; it must be \"beam\", \"eq14\" or \"rigid\"");
+  if (body.structure == "solid" && !path.empty()) {
+    faults.add(
+        join(path, "structure"),
+        "\"solid\" has modes and a mesh but does not fly in this version; in a scene it must be \"beam\", \"eq14\" or "
+        "\"rigid\"");
   }
   check_name_among(faults, join(path, "structure"), body.structure, scene_keys::structures);
   check_name_among(faults, join(path, "directions"), body.directions, scene_keys::directions);
-  check_name_among(faults, join(path, "backend"), body.backend, names_of(eigen_backends()));
+  check_name_among(faults, join(path, "backend"), body.backend, backend_names());
   check_clamp(faults, path, body);
   if (body.modes < 0 || body.modes > max_modes) {
     faults.add(join(path, "modes"), fmt::format("is {}; it must be 0 to {}, or \"auto\"", body.modes, max_modes));

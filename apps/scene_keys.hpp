@@ -16,7 +16,7 @@ namespace flexboom::scene_keys {
 
 inline constexpr std::string_view scene_format = "flexboom-scene-1";
 inline constexpr std::string_view body_format = "flexboom-body-1";
-inline constexpr std::array<std::string_view, 3> structures = {"beam", "eq14", "rigid"};
+inline constexpr std::array<std::string_view, 4> structures = {"beam", "solid", "eq14", "rigid"};
 inline constexpr std::array<std::string_view, 2> directions = {"hinge-plane", "all"};
 inline constexpr std::array<std::string_view, 2> theories = {"euler-bernoulli", "timoshenko"};  // order of BeamTheory
 inline constexpr std::array<std::string_view, 2> shear_rules = {"cowper", "nu-squared"};        // or a number

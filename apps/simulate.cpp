@@ -67,7 +67,7 @@ PreparedBody prepare_beam(const BodyScene& b, int refine) {
   r.checks = check_invariants(r.body, mesh, assembly, basis);
   r.eigen = basis.summary;
   r.elements = static_cast<int>(mesh.elements.size());
-  r.dofs = static_cast<int>(free_dofs(assembly.dofs, clamp).size());
+  r.dofs = basis.unknowns;
   if (b.structure == "rigid") r.body.structure = "rigid";
   return r;
 }

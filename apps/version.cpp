@@ -1,5 +1,7 @@
 #include "apps/version.hpp"
 
+#include "fem/inertia.hpp"
+
 #include <Spectra/Util/Version.h>
 #include <cholmod.h>
 #include <fmt/format.h>
@@ -22,6 +24,10 @@ std::string version_text() {
   // What CHOLMOD and ARPACK bring along; their versions are those of the system that runs the program.
   line("AMD, COLAMD", "", "BSD-3-Clause (with CAMD, CCOLAMD)");
   line("METIS", "", "Apache-2.0");
+  for (const InertiaMethod& method : inertia_methods()) {
+    if (method.name == "mumps") line("MUMPS", "", "CeCILL-C (sequential)");
+  }
+  line("pugixml, zlib", "", "MIT, zlib");
   line("OpenBLAS", "", "BSD-3-Clause (or another BLAS and LAPACK)");
   line("GNU runtime", "", "GPL-3.0+ with the runtime exception (libgomp, libgfortran)");
   line("ARPACK-NG", "3.8", "BSD-3-Clause");

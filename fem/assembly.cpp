@@ -1,7 +1,11 @@
 #include "fem/assembly.hpp"
 
 #include "fem/check.hpp"
+#include "fem/constraints.hpp"
+#include "fem/parallel.hpp"
+#include "fem/pattern.hpp"
 
+#include <fmt/format.h>
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -17,135 +21,163 @@ using Eigen::Matrix3Xd;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-using Triplets = std::vector<Eigen::Triplet<double>>;
-
-const ElementType& type_of(const Element& element) { return element_types()[static_cast<size_t>(element.type)]; }
 
 const Element& element_of(const Mesh& mesh, int element) { return mesh.elements[static_cast<size_t>(element)]; }
 
+/// Freedoms of each node: as many as the elements around it have; a reference node of a connection and a node that an
+/// equation turns have rotations.
+std::vector<int> node_freedoms(const Mesh& mesh) {
+  std::vector<int> freedoms(static_cast<size_t>(mesh.nodes.cols()), 0);
+  const auto at_least = [&freedoms](int node, int wanted) {
+    int& present = freedoms[static_cast<size_t>(node)];
+    present = std::max(present, wanted);
+  };
+  for (const Element& element : mesh.elements) {
+    for (const int node : element.nodes) at_least(node, type_of(element).node_freedoms);
+  }
+  for (const RigidConnection& c : mesh.rigid_connections) {
+    at_least(c.reference, 6);
+    for (const int node : c.nodes) at_least(node, 3);
+  }
+  for (const DistributingConnection& c : mesh.distributing_connections) {
+    at_least(c.reference, 6);
+    for (const int node : c.nodes) at_least(node, 3);
+  }
+  for (const LinearEquation& equation : mesh.equations) {
+    for (const LinearEquation::Term& term : equation.terms) at_least(term.node, term.component < 3 ? 3 : 6);
+  }
+  for (const NodalBody& body : mesh.bodies) at_least(body.node, 3);
+  return freedoms;
+}
+
 DofMap number_dofs(const Mesh& mesh) {
   DofMap dofs;
-  dofs.count = 6 * static_cast<int>(mesh.nodes.cols());
+  for (const int freedoms : node_freedoms(mesh)) {
+    dofs.node_offset.push_back(dofs.count);
+    dofs.count += freedoms;
+  }
+  dofs.node_offset.push_back(dofs.count);
   for (const Element& element : mesh.elements) {
     dofs.element_offset.push_back(dofs.count);
     dofs.count += type_of(element).internal_freedoms(mesh, element);
   }
+  dofs.element_offset.push_back(dofs.count);
   dofs.absent.assign(static_cast<size_t>(dofs.count), 0);
   return dofs;
 }
 
-std::vector<int> of_node_body(int node) {
-  std::vector<int> dofs(6);
-  std::iota(dofs.begin(), dofs.end(), DofMap::of_node(node, 0));
-  return dofs;
+std::vector<int> of_node_body(const DofMap& dofs, int node) {
+  std::vector<int> result(static_cast<size_t>(dofs.freedoms_of(node)));
+  std::iota(result.begin(), result.end(), dofs.of_node(node, 0));
+  return result;
 }
 
-// Adds both triangles of a symmetric matrix given by its lower one. Entries that only the round-off of cancelling
-// points left are dropped, so that the two bending planes, torsion and extension stay apart where the element says so.
-void add(Triplets& triplets, const MatrixXd& lower, const std::vector<int>& dofs) {
+// Zeroes what only the round-off of cancelling points left, so that the two bending planes, torsion and extension of a
+// beam stay apart where the element says so.
+void drop_noise(MatrixXd& lower) {
   constexpr double noise = 16 * std::numeric_limits<double>::epsilon();
   const VectorXd scale = lower.diagonal().cwiseAbs().cwiseSqrt();
   for (Index j = 0; j < lower.cols(); ++j) {
-    for (Index i = j; i < lower.rows(); ++i) {
-      const double value = lower(i, j);
-      if (i != j && std::abs(value) <= noise * scale(i) * scale(j)) continue;
-      if (value == 0) continue;
-      const int row = dofs[static_cast<size_t>(i)], column = dofs[static_cast<size_t>(j)];
-      triplets.emplace_back(row, column, value);
-      if (i != j) triplets.emplace_back(column, row, value);
+    for (Index i = j + 1; i < lower.rows(); ++i) {
+      if (std::abs(lower(i, j)) <= noise * scale(i) * scale(j)) lower(i, j) = 0;
     }
   }
 }
 
-SparseMatrix make_sparse(int size, const Triplets& triplets) {
-  SparseMatrix A(size, size);
-  A.setFromTriplets(triplets.begin(), triplets.end());
-  return A;
+// Sum of dm N^T N, lower triangle. A node without rotations carries the mass of a body and not its inertia.
+MatrixXd body_mass(const Mesh& mesh, const DofMap& dofs, const NodalBody& body) {
+  const Index freedoms = dofs.freedoms_of(body.node);
+  MatrixXd lower = MatrixXd::Zero(freedoms, freedoms);
+  nodal_body_mass_points(mesh, body, [&](double dm, const Vector3d&, const Eigen::Ref<const Matrix3Xd>& N) {
+    lower.selfadjointView<Eigen::Lower>().rankUpdate(N.leftCols(freedoms).transpose(), dm);
+  });
+  return lower;
 }
 
-// Sum of dm N^T N, lower triangle.
-struct MassSum {
-  MatrixXd lower;
-  void operator()(double dm, const Vector3d&, const Eigen::Ref<const Matrix3Xd>& N) {
-    if (lower.size() == 0) lower.setZero(N.cols(), N.cols());
-    lower.selfadjointView<Eigen::Lower>().rankUpdate(N.transpose(), dm);
-  }
-};
-
-SparseMatrix assemble_stiffness(const Mesh& mesh, const DofMap& dofs) {
-  Triplets triplets;
-  for (size_t e = 0; e < mesh.elements.size(); ++e) {
-    const Element& element = mesh.elements[e];
-    add(triplets, type_of(element).stiffness(mesh, element), dofs.of_element(mesh, static_cast<int>(e)));
-  }
-  return make_sparse(dofs.count, triplets);
+// Without beams every entry of the pattern is kept: the columns of a node's freedoms are then alike.
+void finish(SparseMatrix& A, bool has_beams) {
+  if (has_beams) A.prune([](Index, Index, double value) { return value != 0; });
 }
 
-SparseMatrix assemble_mass(const Mesh& mesh, const DofMap& dofs) {
-  Triplets triplets;
-  for (size_t e = 0; e < mesh.elements.size(); ++e) {
-    const Element& element = mesh.elements[e];
-    MassSum sum;
-    type_of(element).mass_points(mesh, element, 0, std::ref(sum));
-    add(triplets, sum.lower, dofs.of_element(mesh, static_cast<int>(e)));
-  }
-  for (const NodalBody& body : mesh.bodies) {
-    MassSum sum;
-    nodal_body_mass_points(mesh, body, std::ref(sum));
-    if (sum.lower.size() > 0) add(triplets, sum.lower, of_node_body(body.node));
-  }
-  return make_sparse(dofs.count, triplets);
-}
+// Freedoms that no mass can reach through K, connections and equations: a connected group without any mass has no
+// motion of its own and takes no part in that of others (torsion of a line mass).
+std::vector<char> massless_groups(const Mesh& mesh, const DofMap& dofs, const SparseMatrix& K, const SparseMatrix& M) {
+  std::vector<char> massless(static_cast<size_t>(K.cols()), 0);
+  const VectorXd mass = M.diagonal();
+  if ((mass.array() != 0).all()) return massless;
 
-// Freedoms that no mass can reach through K: a connected group without any mass has no motion of its own and takes no
-// part in that of others (torsion of a line mass).
-std::vector<char> massless_groups(const SparseMatrix& K, const SparseMatrix& M) {
-  std::vector<char> reached(static_cast<size_t>(K.cols()), 0);
-  std::vector<Index> front;
-  for (Index j = 0; j < M.cols(); ++j) {
-    if (M.coeff(j, j) == 0) continue;
-    reached[static_cast<size_t>(j)] = 1;
-    front.push_back(j);
+  std::vector<int> parent(static_cast<size_t>(K.cols()));
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&parent](int i) {
+    while (parent[static_cast<size_t>(i)] != i) {
+      i = parent[static_cast<size_t>(i)] = parent[static_cast<size_t>(parent[static_cast<size_t>(i)])];
+    }
+    return i;
+  };
+  const auto join = [&](int i, int j) { parent[static_cast<size_t>(root(i))] = root(j); };
+  for (int j = 0; j < K.cols(); ++j) {
+    for (SparseMatrix::InnerIterator it(K, j); it; ++it) join(static_cast<int>(it.row()), j);
   }
-  while (!front.empty()) {
-    const Index j = front.back();
-    front.pop_back();
-    for (SparseMatrix::InnerIterator it(K, j); it; ++it) {
-      if (reached[static_cast<size_t>(it.row())]) continue;
-      reached[static_cast<size_t>(it.row())] = 1;
-      front.push_back(it.row());
+  for (const ConstraintRow& row : constraint_rows(mesh, dofs)) {
+    for (const auto& [dof, coefficient] : row.terms) {
+      if (coefficient != 0) join(dof, row.terms.front().first);
     }
   }
-  for (char& flag : reached) flag = !flag;
-  return reached;
-}
-
-VectorXd gather(const Eigen::Ref<const VectorXd>& u, std::span<const int> dofs) {
-  VectorXd local(static_cast<Index>(dofs.size()));
-  for (size_t i = 0; i < dofs.size(); ++i) local(static_cast<Index>(i)) = u(dofs[i]);
-  return local;
+  std::vector<char> has_mass(parent.size(), 0);
+  for (int i = 0; i < K.cols(); ++i) {
+    if (mass(i) != 0) has_mass[static_cast<size_t>(root(i))] = 1;
+  }
+  for (int i = 0; i < K.cols(); ++i) massless[static_cast<size_t>(i)] = !has_mass[static_cast<size_t>(root(i))];
+  return massless;
 }
 
 }  // namespace
 
 std::vector<int> DofMap::of_element(const Mesh& mesh, int element) const {
   std::vector<int> dofs;
+  const int per_node = type_of(element_of(mesh, element)).node_freedoms;
   for (int node : element_of(mesh, element).nodes) {
-    for (int component = 0; component < 6; ++component) dofs.push_back(of_node(node, component));
+    for (int component = 0; component < per_node; ++component) dofs.push_back(of_node(node, component));
   }
   const auto e = static_cast<size_t>(element);
-  const int end = e + 1 < element_offset.size() ? element_offset[e + 1] : count;
-  for (int dof = element_offset[e]; dof < end; ++dof) dofs.push_back(dof);
+  for (int dof = element_offset[e]; dof < element_offset[e + 1]; ++dof) dofs.push_back(dof);
   return dofs;
 }
 
-Assembly assemble(const Mesh& mesh) {
+Assembly assemble(const Mesh& mesh, int threads) {
   mesh.validate();
   DofMap dofs = number_dofs(mesh);
-  SparseMatrix K = assemble_stiffness(mesh, dofs);
-  SparseMatrix M = assemble_mass(mesh, dofs);
-  dofs.absent = massless_groups(K, M);
-  return {std::move(K), std::move(M), std::move(dofs)};
+  const EntityGraph graph = entity_graph(mesh, dofs);
+  PatternMatrix K(graph, Coupling::full);
+  PatternMatrix M(graph, Coupling::by_component);
+  bool has_beams = false;
+  for (const Element& element : mesh.elements) has_beams = has_beams || type_of(element).shape == Shape::line;
+  for (const std::vector<int>& group : independent_groups(mesh, dofs)) {
+    parallel_for(threads, static_cast<int>(group.size()), 16, [&](int i) {
+      const int e = group[static_cast<size_t>(i)];
+      const Element& element = element_of(mesh, e);
+      const ElementType& type = type_of(element);
+      MatrixXd stiffness = type.stiffness(mesh, element);
+      MatrixXd mass = type.mass(mesh, element);
+      if (type.shape == Shape::line) {
+        drop_noise(stiffness);
+        drop_noise(mass);
+      }
+      const std::vector<int> entities = entities_of(mesh, dofs, e);
+      K.add(entities, type.node_freedoms, stiffness);
+      M.add(entities, type.node_freedoms, mass);
+    });
+  }
+  for (const NodalBody& body : mesh.bodies) {
+    MatrixXd mass = body_mass(mesh, dofs, body);
+    drop_noise(mass);
+    M.add({body.node}, dofs.freedoms_of(body.node), mass);
+  }
+  Assembly result{K.take(), M.take(), std::move(dofs)};
+  finish(result.K, has_beams);
+  finish(result.M, has_beams);
+  result.dofs.absent = massless_groups(mesh, result.dofs, result.K, result.M);
+  return result;
 }
 
 void for_each_mass_point(const Mesh& mesh, const DofMap& dofs, const MeshMassPointVisitor& visit, int extra) {
@@ -157,90 +189,76 @@ void for_each_mass_point(const Mesh& mesh, const DofMap& dofs, const MeshMassPoi
         [&](double dm, const Vector3d& u0, const Eigen::Ref<const Matrix3Xd>& N) { visit(dm, u0, N, element_dofs); });
   }
   for (const NodalBody& body : mesh.bodies) {
-    const std::vector<int> body_dofs = of_node_body(body.node);
+    const std::vector<int> body_dofs = of_node_body(dofs, body.node);
     nodal_body_mass_points(mesh, body, [&](double dm, const Vector3d& u0, const Eigen::Ref<const Matrix3Xd>& N) {
-      visit(dm, u0, N, body_dofs);
+      visit(dm, u0, N.leftCols(std::ssize(body_dofs)), body_dofs);
     });
   }
 }
 
-PointEnergies point_energies(const Mesh& mesh, const DofMap& dofs, const Eigen::Ref<const VectorXd>& u) {
-  require(u.size() == dofs.count, "point_energies: the vector has " + std::to_string(u.size()) +
-                                      " entries, the mesh has " + std::to_string(dofs.count) + " freedoms");
+PointEnergies point_energies(const Mesh& mesh, const Assembly& assembly, const Eigen::Ref<const MatrixXd>& U,
+                             int threads) {
+  require(
+      U.rows() == assembly.dofs.count,
+      fmt::format("point_energies: vectors have {} entries, the mesh has {} freedoms", U.rows(), assembly.dofs.count));
+  // Summed in blocks of fixed size, so that the result is the same for any number of threads.
+  constexpr int block = 256;
+  const auto elements = static_cast<int>(mesh.elements.size());
+  const int blocks = (elements + block - 1) / block;
+  MatrixXd strain = MatrixXd::Zero(U.cols(), blocks);
+  parallel_for(threads, blocks, 1, [&](int b) {
+    for (int e = b * block; e < std::min(elements, (b + 1) * block); ++e) {
+      const Element& element = element_of(mesh, e);
+      const MatrixXd q = U(assembly.dofs.of_element(mesh, e), Eigen::all);
+      strain.col(b) += type_of(element).strain_energy(mesh, element, q);
+    }
+  });
   PointEnergies energy;
-  for (size_t e = 0; e < mesh.elements.size(); ++e) {
-    const Element& element = mesh.elements[e];
-    const VectorXd q = gather(u, dofs.of_element(mesh, static_cast<int>(e)));
-    type_of(element).strain_points(mesh, element, [&](double weight, const MatrixXd& B, const MatrixXd& D) {
-      const VectorXd strain = B * q;
-      energy.strain += weight / 2 * strain.dot(D * strain);
-    });
-  }
-  for_each_mass_point(
-      mesh, dofs,
-      [&](double dm, const Vector3d&, const Eigen::Ref<const Matrix3Xd>& N, std::span<const int> point_dofs) {
-        energy.kinetic += dm / 2 * (N * gather(u, point_dofs)).squaredNorm();
-      });
+  energy.strain = strain.rowwise().sum();
+  energy.kinetic = (U.cwiseProduct(symmetric_product(assembly.M, U))).colwise().sum().transpose() / 2;
   return energy;
 }
 
-std::vector<int> free_dofs(const DofMap& dofs, std::span<const int> clamped_nodes) {
-  std::vector<char> leaves = dofs.absent;
-  for (int node : clamped_nodes) {
-    const int first = DofMap::of_node(node, 0);
-    require(node >= 0 && first + 6 <= dofs.count, "clamp: node " + std::to_string(node) + " is missing");
-    std::fill_n(leaves.begin() + first, 6, char{1});
-  }
-  std::vector<int> free;
-  for (int dof = 0; dof < dofs.count; ++dof) {
-    if (!leaves[static_cast<size_t>(dof)]) free.push_back(dof);
-  }
-  return free;
-}
-
-SparseMatrix submatrix(const SparseMatrix& A, std::span<const int> dofs) {
-  std::vector<int> position(static_cast<size_t>(A.rows()), -1);
-  for (size_t i = 0; i < dofs.size(); ++i) position[static_cast<size_t>(dofs[i])] = static_cast<int>(i);
-  Triplets triplets;
-  for (size_t j = 0; j < dofs.size(); ++j) {
-    for (SparseMatrix::InnerIterator it(A, dofs[j]); it; ++it) {
-      const int row = position[static_cast<size_t>(it.row())];
-      if (row >= 0) triplets.emplace_back(row, static_cast<int>(j), it.value());
-    }
-  }
-  return make_sparse(static_cast<int>(dofs.size()), triplets);
-}
-
-Eigen::MatrixXd rigid_motions(const Mesh& mesh, const DofMap& dofs) {
+MatrixXd rigid_motions(const Mesh& mesh, const DofMap& dofs) {
   // u = t + r x X, theta = r at the nodes; the node shapes contain every linear motion, so internal freedoms stay zero.
   MatrixXd T = MatrixXd::Zero(dofs.count, 6);
   for (int node = 0; node < mesh.nodes.cols(); ++node) {
+    if (dofs.freedoms_of(node) == 0) continue;
     for (int k = 0; k < 3; ++k) {
-      T(DofMap::of_node(node, k), k) = 1;
-      T.block<3, 1>(DofMap::of_node(node, 0), 3 + k) = Vector3d::Unit(k).cross(Vector3d(mesh.nodes.col(node)));
-      T(DofMap::of_node(node, 3 + k), 3 + k) = 1;
+      T(dofs.of_node(node, k), k) = 1;
+      T.block<3, 1>(dofs.of_node(node, 0), 3 + k) = Vector3d::Unit(k).cross(Vector3d(mesh.nodes.col(node)));
+      if (dofs.freedoms_of(node) == 6) T(dofs.of_node(node, 3 + k), 3 + k) = 1;
     }
   }
   return T;
 }
 
+Matrix3Xd nodal_displacement(const Mesh& mesh, const DofMap& dofs, const Eigen::Ref<const VectorXd>& u) {
+  Matrix3Xd result = Matrix3Xd::Zero(3, mesh.nodes.cols());
+  for (int node = 0; node < mesh.nodes.cols(); ++node) {
+    if (dofs.freedoms_of(node) > 0) result.col(node) = u.segment<3>(dofs.of_node(node, 0));
+  }
+  return result;
+}
+
 DisplayLines display_lines(const Mesh& mesh, int points_per_element) {
   require(points_per_element >= 2, "display_lines: a line needs at least 2 points");
   DisplayLines display;
-  const int elements = static_cast<int>(mesh.elements.size());
-  display.points.resize(3, static_cast<Index>(elements) * points_per_element);
-  for (int e = 0; e < elements; ++e) {
+  std::vector<Vector3d> points;
+  for (int e = 0; e < std::ssize(mesh.elements); ++e) {
+    if (type_of(element_of(mesh, e)).shape != Shape::line) continue;
     const std::vector<int>& nodes = element_of(mesh, e).nodes;
     std::vector<int>& line = display.lines.emplace_back();
     for (int i = 0; i < points_per_element; ++i) {
       const double s = static_cast<double>(i) / (points_per_element - 1);
-      const int point = e * points_per_element + i;
-      display.points.col(point) = (1 - s) * mesh.nodes.col(nodes[0]) + s * mesh.nodes.col(nodes[1]);
+      line.push_back(static_cast<int>(points.size()));
+      points.emplace_back((1 - s) * mesh.nodes.col(nodes[0]) + s * mesh.nodes.col(nodes[1]));
       display.element.push_back(e);
       display.parameter.push_back(s);
-      line.push_back(point);
     }
   }
+  display.points.resize(3, std::ssize(points));
+  for (Index i = 0; i < display.points.cols(); ++i) display.points.col(i) = points[static_cast<size_t>(i)];
   return display;
 }
 

@@ -1,58 +1,61 @@
 #pragma once
 
 #include "fem/element.hpp"
-
-#include <Eigen/SparseCore>
+#include "fem/sparse.hpp"
 
 #include <functional>
+#include <span>
 #include <vector>
 
 namespace flexboom {
 
-using SparseMatrix = Eigen::SparseMatrix<double>;
-
-/// Numbering of freedoms: 6 per node (ux uy uz rx ry rz, body axes), then the internal freedoms of each element.
-/// Freedoms without stiffness and mass (torsion of a line mass) are `absent` and leave the problem.
+/// Numbering of freedoms: those of each node (none, 3: ux uy uz, or 6: and rx ry rz, mesh axes), then the internal
+/// freedoms of each element. Freedoms that no mass can reach (torsion of a line mass) are `absent` and leave the
+/// problem.
 struct DofMap {
   int count = 0;
-  std::vector<int> element_offset;  // first internal freedom of each element
+  std::vector<int> node_offset;     // first freedom of each node, and one past the last node's
+  std::vector<int> element_offset;  // first internal freedom of each element, and one past the last element's
   std::vector<char> absent;         // one flag per freedom
-  static int of_node(int node, int component) { return 6 * node + component; }
+
+  int of_node(int node, int component) const { return node_offset[static_cast<size_t>(node)] + component; }
+  int freedoms_of(int node) const {
+    return node_offset[static_cast<size_t>(node) + 1] - node_offset[static_cast<size_t>(node)];
+  }
   std::vector<int> of_element(const Mesh&, int element) const;
 };
 
-/// Stiffness and consistent mass over all freedoms, nothing clamped; both symmetric, both triangles stored.
+/// Stiffness and consistent mass over all freedoms, nothing supported or connected: lower triangles.
 struct Assembly {
   SparseMatrix K;  // [N/m, N, N m]
   SparseMatrix M;  // [kg, kg m, kg m^2]
   DofMap dofs;
 };
 
+/// The result does not depend on the number of threads.
 /// @throws InputError as Mesh::validate.
-Assembly assemble(const Mesh&);
+Assembly assemble(const Mesh&, int threads = 1);
 
 /// Visits every mass point of a mesh with its freedoms: (dm, u0, N, freedoms).
 using MeshMassPointVisitor = std::function<void(
     double dm, const Eigen::Vector3d& u0, const Eigen::Ref<const Eigen::Matrix3Xd>& N, std::span<const int> dofs)>;
 void for_each_mass_point(const Mesh&, const DofMap&, const MeshMassPointVisitor&, int extra = 0);
 
-/// Strain energy and generalised mass of a full vector summed over element points: more digits than u^T K u.
+/// Strain energies and generalised masses of full vectors (freedoms x k): the first summed over strain points, which
+/// keeps more digits than u^T K u.
 struct PointEnergies {
-  double strain = 0;   // 1/2 u^T K u
-  double kinetic = 0;  // 1/2 u^T M u
+  Eigen::VectorXd strain;   // 1/2 u^T K u [J]
+  Eigen::VectorXd kinetic;  // 1/2 u^T M u
 };
-PointEnergies point_energies(const Mesh&, const DofMap&, const Eigen::Ref<const Eigen::VectorXd>& u);
-
-/// The freedoms that remain when all six of each listed node are clamped and absent ones are dropped, ascending.
-std::vector<int> free_dofs(const DofMap&, std::span<const int> clamped_nodes);
-
-/// Principal submatrix on the listed freedoms.
-SparseMatrix submatrix(const SparseMatrix&, std::span<const int> dofs);
+PointEnergies point_energies(const Mesh&, const Assembly&, const Eigen::Ref<const Eigen::MatrixXd>& U, int threads = 1);
 
 /// Six rigid-body motions (columns: 3 translations, 3 rotations about the body origin) of every freedom, count x 6.
 Eigen::MatrixXd rigid_motions(const Mesh&, const DofMap&);
 
-/// Points along the elements for drawing: positions (3 x N), rows of the shapes there, and the lines between them.
+/// Displacement of every node of a full vector (freedoms), 3 x nodes [m].
+Eigen::Matrix3Xd nodal_displacement(const Mesh&, const DofMap&, const Eigen::Ref<const Eigen::VectorXd>& u);
+
+/// Points along the beams for drawing: positions (3 x N), rows of the shapes there, and the lines between them.
 struct DisplayLines {
   Eigen::Matrix3Xd points;
   std::vector<int> element;             // element of each point

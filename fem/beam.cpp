@@ -1,5 +1,8 @@
 #include "fem/beam.hpp"
 
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -242,8 +245,30 @@ void mass_points(const Mesh& mesh, const Element& element, int extra, const Mass
   }
 }
 
-Matrix6X interpolation(const Mesh& mesh, const Element& element, double s) {
-  return motion_rows(frame_of(mesh, element), element.order, has_shear(property_of(mesh, element)), 2 * s - 1);
+Matrix6X interpolation(const Mesh& mesh, const Element& element, const Vector3d& at) {
+  return motion_rows(frame_of(mesh, element), element.order, has_shear(property_of(mesh, element)), 2 * at(0) - 1);
+}
+
+Vector3d position(const Mesh& mesh, const Element& element, const Vector3d& at) {
+  return (1 - at(0)) * mesh.nodes.col(element.nodes[0]) + at(0) * mesh.nodes.col(element.nodes[1]);
+}
+
+void validate(const Mesh& mesh, const Element& element) {
+  constexpr int max_order = 12;
+  require(element.order >= 1 && element.order <= max_order,
+          fmt::format("order is {}; it must be 1 to {}", element.order, max_order));
+  require(element.property >= 0 && element.property < static_cast<int>(mesh.beam_properties.size()),
+          fmt::format("beam property {} is missing; the mesh has {}", element.property, mesh.beam_properties.size()));
+  const BeamProperty& property = mesh.beam_properties[static_cast<size_t>(element.property)];
+  const bool sheared = property.theory == BeamTheory::timoshenko;
+  require(element.type == element_type(sheared ? "beam-timoshenko" : "beam-euler-bernoulli"),
+          fmt::format("type \"{}\" does not agree with the theory of its property", type_of(element).name));
+  const Vector3d axis = mesh.nodes.col(element.nodes[1]) - mesh.nodes.col(element.nodes[0]);
+  require(axis.norm() > 0, "beam of zero length");
+  require(axis.normalized().cross(property.y_axis.normalized()).norm() > 1e-6,
+          "the y axis of the section is parallel to the beam");
+  require(property.rotary_inertia || (axis.array() != 0).count() == 1,
+          "a beam without rotary inertia must run along an axis of the mesh (its torsion has no mass)");
 }
 
 }  // namespace flexboom::beam

@@ -16,7 +16,14 @@ void strain_points(const Mesh&, const Element&, const StrainPointVisitor&);
 /// Four points in every section that carry its A, Iy, Iz exactly, or one on the axis without rotary inertia.
 void mass_points(const Mesh&, const Element&, int extra, const MassPointVisitor&);
 
-/// Displacement [m] and rotation [rad] rows in mesh axes.
-Eigen::Matrix<double, 6, Eigen::Dynamic> interpolation(const Mesh&, const Element&, double s);
+/// Displacement [m] and rotation [rad] rows in mesh axes at (s, -, -), s in [0, 1].
+Eigen::Matrix<double, 6, Eigen::Dynamic> interpolation(const Mesh&, const Element&, const Eigen::Vector3d& at);
+
+/// Point of the axis at (s, -, -).
+Eigen::Vector3d position(const Mesh&, const Element&, const Eigen::Vector3d& at);
+
+/// @throws InputError for a zero length, a theory that is not the row's, a section axis along the beam, and a line mass
+/// that does not run along an axis of the mesh.
+void validate(const Mesh&, const Element&);
 
 }  // namespace flexboom::beam

@@ -2,6 +2,9 @@
 
 #include "fem/beam.hpp"
 #include "fem/check.hpp"
+#include "fem/hexahedron.hpp"
+#include "fem/solid.hpp"
+#include "fem/solid_hex8.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
@@ -18,29 +21,106 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
+using Eigen::VectorXd;
 
 constexpr int max_gauss_points = 64;
 
-// K = sum w B^T D B over the strain points of any element.
+// K = sum w B^T D B over the strain points of any element, lower triangle.
 template <void (*strain_points)(const Mesh&, const Element&, const StrainPointVisitor&)>
-MatrixXd stiffness(const Mesh& mesh, const Element& element) {
+MatrixXd stiffness_from_points(const Mesh& mesh, const Element& element) {
   MatrixXd K;
   strain_points(mesh, element, [&K](double weight, const MatrixXd& B, const MatrixXd& D) {
     if (K.size() == 0) K.setZero(B.cols(), B.cols());
     const MatrixXd DB = weight * D * B;
     K.triangularView<Eigen::Lower>() += B.transpose() * DB;
   });
-  K.triangularView<Eigen::StrictlyUpper>() = K.transpose();
   return K;
 }
 
-// The table: one row per element. The theory of a beam is in its property; Mesh::validate checks that row and property
-// agree.
-constexpr std::array<ElementType, 2> table{{
-    {"beam-euler-bernoulli", 2, beam::internal_freedoms, stiffness<beam::strain_points>, beam::mass_points,
-     beam::strain_points, beam::interpolation},
-    {"beam-timoshenko", 2, beam::internal_freedoms, stiffness<beam::strain_points>, beam::mass_points,
-     beam::strain_points, beam::interpolation},
+// M = sum dm N^T N over the mass points of any element, lower triangle.
+template <void (*mass_points)(const Mesh&, const Element&, int, const MassPointVisitor&)>
+MatrixXd mass_from_points(const Mesh& mesh, const Element& element) {
+  MatrixXd M;
+  mass_points(mesh, element, 0, [&M](double dm, const Vector3d&, const Eigen::Ref<const Eigen::Matrix3Xd>& N) {
+    if (M.size() == 0) M.setZero(N.cols(), N.cols());
+    M.selfadjointView<Eigen::Lower>().rankUpdate(N.transpose(), dm);
+  });
+  return M;
+}
+
+template <void (*strain_points)(const Mesh&, const Element&, const StrainPointVisitor&)>
+VectorXd energy_from_points(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
+  VectorXd energy = VectorXd::Zero(q.cols());
+  strain_points(mesh, element, [&](double weight, const MatrixXd& B, const MatrixXd& D) {
+    const MatrixXd strain = B * q;
+    energy += weight / 2 * strain.cwiseProduct(D * strain).colwise().sum().transpose();
+  });
+  return energy;
+}
+
+template <int count>
+int fixed_count(int) {
+  return count;
+}
+int no_internal_freedoms(const Mesh&, const Element&) { return 0; }
+
+constexpr std::array<int, 1> first_order = {1}, second_order = {2};
+constexpr std::array<int, 12> beam_orders = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+std::span<const int> linear() { return first_order; }
+std::span<const int> quadratic() { return second_order; }
+std::span<const int> of_beams() { return beam_orders; }
+
+constexpr ElementType beam_row(std::string_view name) {
+  return {name,
+          Shape::line,
+          6,
+          fixed_count<2>,
+          of_beams,
+          beam::internal_freedoms,
+          stiffness_from_points<beam::strain_points>,
+          mass_from_points<beam::mass_points>,
+          beam::mass_points,
+          beam::strain_points,
+          beam::interpolation,
+          beam::position,
+          energy_from_points<beam::strain_points>,
+          beam::validate};
+}
+
+template <class Type, class Strains = Type>
+constexpr ElementType solid_row(std::string_view name, Shape shape, int (*node_count)(int),
+                                std::span<const int> (*orders)()) {
+  return {name,
+          shape,
+          3,
+          node_count,
+          orders,
+          no_internal_freedoms,
+          Strains::stiffness,
+          Type::mass,
+          Type::mass_points,
+          Strains::strain_points,
+          Type::interpolation,
+          Type::position,
+          Strains::strain_energy,
+          Type::validate};
+}
+
+// The table: one row per element.
+constexpr std::array<ElementType, 12> table{{
+    beam_row("beam-euler-bernoulli"),
+    beam_row("beam-timoshenko"),
+    solid_row<Hexahedron>("hex", Shape::hexahedron, Hexahedron::node_count, Hexahedron::orders),
+    solid_row<Solid<SolidKind::hex8>, Hex8<Hex8Strain::full>>("hex8", Shape::hexahedron, fixed_count<8>, linear),
+    solid_row<Solid<SolidKind::hex8>, Hex8<Hex8Strain::reduced>>("hex8-reduced", Shape::hexahedron, fixed_count<8>,
+                                                                 linear),
+    solid_row<Solid<SolidKind::hex20>>("hex20", Shape::hexahedron, fixed_count<20>, quadratic),
+    solid_row<Solid<SolidKind::hex20_reduced>>("hex20-reduced", Shape::hexahedron, fixed_count<20>, quadratic),
+    solid_row<Solid<SolidKind::hex27>>("hex27", Shape::hexahedron, fixed_count<27>, quadratic),
+    solid_row<Solid<SolidKind::tet4>>("tet4", Shape::tetrahedron, fixed_count<4>, linear),
+    solid_row<Solid<SolidKind::tet10>>("tet10", Shape::tetrahedron, fixed_count<10>, quadratic),
+    solid_row<Solid<SolidKind::wedge6>>("wedge6", Shape::wedge, fixed_count<6>, linear),
+    solid_row<Solid<SolidKind::wedge15>>("wedge15", Shape::wedge, fixed_count<15>, quadratic),
 }};
 
 // Root i of P_n by Newton from the asymptotic estimate, in long double so that the rounded values are correct doubles.
@@ -78,6 +158,8 @@ int element_type(std::string_view name) {
   }
   throw InputError(fmt::format("element type \"{}\" is not known; there are {}", name, known));
 }
+
+const ElementType& type_of(const Element& element) { return table[static_cast<size_t>(element.type)]; }
 
 const GaussRule& gauss_rule(int n) {
   static std::array<GaussRule, max_gauss_points + 1> rules;

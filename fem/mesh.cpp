@@ -2,10 +2,10 @@
 
 #include "fem/check.hpp"
 #include "fem/element.hpp"
+#include "fem/validation.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -15,254 +15,188 @@
 namespace flexboom {
 namespace {
 
-using Eigen::Matrix3d;
+using Eigen::Index;
 using Eigen::Vector3d;
 
-constexpr int max_order = 12;
-constexpr int default_elements = 8;   // of a boom whose segments leave the choice to make_mesh
-constexpr int max_elements = 100000;  // of a segment; more is a typing error
-constexpr double round_off = 1e-12;   // relative
+std::string element_name(const Mesh& mesh, int e) {
+  const Element& element = mesh.elements[static_cast<size_t>(e)];
+  return fmt::format("{} element {}", type_of(element).name, mesh.element_label(e));
+}
 
-// Runs a check and puts `where` in front of what it says.
-template <class Check>
-void within(const std::string& where, const Check& check) {
+void require_node(const Mesh& mesh, int node) {
+  require(node >= 0 && node < mesh.nodes.cols(),
+          fmt::format("node {} is missing; the mesh has nodes 0 to {}", node, mesh.nodes.cols() - 1));
+}
+
+void validate_element(const Mesh& mesh, int e) {
+  const Element& element = mesh.elements[static_cast<size_t>(e)];
+  const auto rows = static_cast<int>(element_types().size());
+  require(element.type >= 0 && element.type < rows,
+          fmt::format("elements[{}]: type {} is not a row of the table of {} elements", e, element.type, rows));
+  const ElementType& type = type_of(element);
   try {
-    check();
+    const int count = type.node_count(element.order);
+    require(std::ssize(element.nodes) == count,
+            fmt::format("has {} nodes; \"{}\" has {}", element.nodes.size(), type.name, count));
+    for (const int node : element.nodes) require_node(mesh, node);
+    type.validate(mesh, element);
   } catch (const InputError& error) {
-    throw InputError(where + ": " + error.what());
+    throw InputError(element_name(mesh, e) + ": " + error.what());
   }
 }
 
-void validate_rigid(double mass, const Matrix3d& inertia, const Vector3d& offset) {
-  require(std::isfinite(mass) && mass >= 0, fmt::format("mass is {} kg; it must be zero or positive", mass));
-  require(offset.allFinite(), "offset has a component that is not finite");
-  require(inertia.allFinite(), "inertia has an entry that is not finite");
-  const double scale = inertia.cwiseAbs().maxCoeff();
-  require((inertia - inertia.transpose()).cwiseAbs().maxCoeff() <= round_off * scale, "inertia must be symmetric");
-  require(mass > 0 || scale == 0, "inertia without mass; give the mass that carries it");
-  require(mass > 0 || offset.isZero(0), "offset without mass; give the mass that it moves");
-  const Vector3d I = Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
-  require(I(0) >= -round_off * scale, fmt::format("inertia has the negative principal value {} kg m^2", I(0)));
-  require(I(0) + I(1) >= I(2) - round_off * scale,
-          fmt::format("inertia breaks the triangle inequality: principal values {}, {}, {} kg m^2; "
-                      "none can exceed the sum of the others",
-                      I(0), I(1), I(2)));
-}
+/// Sets of nodes that hang together, by union and find.
+class Parts {
+ public:
+  explicit Parts(Index nodes) : parent_(static_cast<size_t>(nodes)) { std::iota(parent_.begin(), parent_.end(), 0); }
 
-// The section constants exist at both ends and, the dimensions being linear, in between.
-void validate_sections(const SectionShape& start, const SectionShape& end, const Material& material, BeamTheory theory,
-                       const ShearRule& shear) {
-  const ShearRule rule = theory == BeamTheory::timoshenko ? shear : ShearRule{"value", 1};
-  within("start", [&] { section_of(start, material.nu, rule); });
-  within("end", [&] { section_of(end, material.nu, rule); });
-  interpolate(start, end, 0.5);
-}
-
-void validate_segment(const BeamSegment& segment, const BeamGeometry& boom) {
-  require(std::isfinite(segment.length) && segment.length > 0,
-          fmt::format("length is {} m; it must be positive", segment.length));
-  require(segment.elements >= 0 && segment.elements <= max_elements,
-          fmt::format("elements is {}; it must be 1 to {}, or 0 to let the program choose", segment.elements,
-                      max_elements));
-  segment.material.validate();
-  validate_sections(segment.start, segment.end, segment.material, boom.theory, boom.shear);
-}
-
-void validate_attachment(const RigidAttachment& attachment, double boom_length) {
-  const double x = attachment.position;
-  require(std::isfinite(x) && x >= 0 && x <= boom_length * (1 + round_off),
-          fmt::format("position is {} m; the boom reaches from 0 to {} m", x, boom_length));
-  validate_rigid(attachment.mass, attachment.inertia, attachment.offset);
-}
-
-void validate_order(int order) {
-  require(order >= 1 && order <= max_order, fmt::format("order is {}; it must be 1 to {}", order, max_order));
-}
-
-// Where nodes are needed, as fractions of a segment: 0, attachments inside, 1.
-std::vector<double> cuts_of_segment(const BeamGeometry& boom, double start, double length) {
-  std::vector<double> cuts = {0, 1};
-  for (const RigidAttachment& attachment : boom.attachments) {
-    const double s = (attachment.position - start) / length;
-    const bool is_new = std::none_of(
-        cuts.begin(), cuts.end(), [&](double cut) { return std::abs(s - cut) * length <= round_off * boom.length(); });
-    if (s > 0 && s < 1 && is_new) cuts.push_back(s);
+  int root(int node) {
+    while (parent_[at(node)] != node) node = parent_[at(node)] = parent_[at(parent_[at(node)])];
+    return node;
   }
-  std::sort(cuts.begin(), cuts.end());
-  return cuts;
-}
+  void join(int a, int b) { parent_[at(root(a))] = root(b); }
 
-int share(double count, double fraction) { return std::max(1, static_cast<int>(std::lround(count * fraction))); }
-
-// A boom mesh under construction: nodes along x and a chain of elements.
-struct Chain {
-  Mesh mesh;
-  std::vector<double> x = {0};
-
-  void append(const BeamGeometry& boom, const BeamSegment& segment, double start, double from, double to) {
-    const BeamProperty property{interpolate(segment.start, segment.end, from),
-                                interpolate(segment.start, segment.end, to),
-                                segment.material,
-                                boom.theory,
-                                boom.shear,
-                                boom.rotary_inertia,
-                                Vector3d::UnitY()};
-    const bool sheared = boom.theory == BeamTheory::timoshenko;
-    const int node = static_cast<int>(x.size());
-    const int type = element_type(sheared ? "beam-timoshenko" : "beam-euler-bernoulli");
-    mesh.elements.push_back({type, {node - 1, node}, boom.order, static_cast<int>(mesh.beam_properties.size())});
-    mesh.beam_properties.push_back(property);
-    x.push_back(start + to * segment.length);
-  }
+ private:
+  static size_t at(int node) { return static_cast<size_t>(node); }
+  std::vector<int> parent_;
 };
 
-void append_segment(Chain& chain, const BeamGeometry& boom, const BeamSegment& segment, double start) {
-  const double wanted =
-      segment.elements > 0 ? segment.elements : share(default_elements, segment.length / boom.length());
-  const std::vector<double> cuts = cuts_of_segment(boom, start, segment.length);
-  for (size_t i = 0; i + 1 < cuts.size(); ++i) {
-    const int count = share(wanted, cuts[i + 1] - cuts[i]);
-    for (int k = 0; k < count; ++k) {
-      const double from = std::lerp(cuts[i], cuts[i + 1], static_cast<double>(k) / count);
-      const double to = std::lerp(cuts[i], cuts[i + 1], static_cast<double>(k + 1) / count);
-      chain.append(boom, segment, start, from, to);
-    }
-  }
-}
-
-int nearest_node(const std::vector<double>& x, double position) {
-  const auto nearer = [&](double a, double b) { return std::abs(a - position) < std::abs(b - position); };
-  return static_cast<int>(std::min_element(x.begin(), x.end(), nearer) - x.begin());
-}
-
-void validate_indices(const Mesh& mesh, const Element& element) {
-  const auto types = element_types();
-  require(element.type >= 0 && element.type < static_cast<int>(types.size()),
-          fmt::format("type {} is not a row of the table of {} elements", element.type, types.size()));
-  const ElementType& type = types[static_cast<size_t>(element.type)];
-  require(static_cast<int>(element.nodes.size()) == type.node_count,
-          fmt::format("has {} nodes; \"{}\" has {}", element.nodes.size(), type.name, type.node_count));
-  for (int node : element.nodes) {
-    require(node >= 0 && node < mesh.nodes.cols(),
-            fmt::format("node {} is missing; the mesh has nodes 0 to {}", node, mesh.nodes.cols() - 1));
-  }
-  require(element.property >= 0 && element.property < static_cast<int>(mesh.beam_properties.size()),
-          fmt::format("beam property {} is missing; the mesh has {}", element.property, mesh.beam_properties.size()));
-}
-
-void validate_element(const Mesh& mesh, const Element& element) {
-  validate_indices(mesh, element);
-  validate_order(element.order);
-  const BeamProperty& property = mesh.beam_properties[static_cast<size_t>(element.property)];
-  const bool sheared = property.theory == BeamTheory::timoshenko;
-  require(element.type == element_type(sheared ? "beam-timoshenko" : "beam-euler-bernoulli"),
-          fmt::format("type \"{}\" does not agree with the theory of its property",
-                      element_types()[static_cast<size_t>(element.type)].name));
-  const Vector3d axis = mesh.nodes.col(element.nodes[1]) - mesh.nodes.col(element.nodes[0]);
-  require(axis.norm() > 0, "beam of zero length");
-  require(axis.normalized().cross(property.y_axis.normalized()).norm() > 1e-6,
-          "the y axis of the section is parallel to the beam");
-  require(property.rotary_inertia || (axis.array() != 0).count() == 1,
-          "a beam without rotary inertia must run along an axis of the mesh (its torsion has no mass)");
-}
-
-// Union of nodes through elements: every node is used, and all hang together.
-void validate_connections(const Mesh& mesh) {
-  std::vector<int> parent(static_cast<size_t>(mesh.nodes.cols()));
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int node) {
-    while (parent[static_cast<size_t>(node)] != node) node = parent[static_cast<size_t>(node)];
-    return node;
+/// Nodes of every connection and equation, reference first.
+std::vector<std::vector<int>> connected_groups(const Mesh& mesh) {
+  std::vector<std::vector<int>> groups;
+  const auto add = [&groups](int reference, const std::vector<int>& nodes) {
+    groups.push_back(nodes);
+    groups.back().insert(groups.back().begin(), reference);
   };
-  std::set<int> used;
-  for (const Element& element : mesh.elements) {
-    used.insert(element.nodes.begin(), element.nodes.end());
-    for (int node : element.nodes) parent[static_cast<size_t>(root(node))] = root(element.nodes[0]);
+  for (const RigidConnection& c : mesh.rigid_connections) add(c.reference, c.nodes);
+  for (const DistributingConnection& c : mesh.distributing_connections) add(c.reference, c.nodes);
+  for (const LinearEquation& equation : mesh.equations) {
+    std::vector<int>& group = groups.emplace_back();
+    for (const LinearEquation::Term& term : equation.terms) group.push_back(term.node);
   }
-  for (int node = 0; node < mesh.nodes.cols(); ++node) {
-    require(used.contains(node), fmt::format("node {} belongs to no element", node));
-    require(root(node) == root(0),
-            fmt::format("node {} is not connected with node 0: the mesh has several parts", node));
-  }
+  return groups;
 }
 
-void validate_set(const Mesh& mesh, const std::vector<int>& nodes) {
+std::vector<char> used_nodes(const Mesh& mesh) {
+  std::vector<char> used(static_cast<size_t>(mesh.nodes.cols()), 0);
+  const auto mark = [&used](const std::vector<int>& nodes) {
+    for (const int node : nodes) used[static_cast<size_t>(node)] = 1;
+  };
+  for (const Element& element : mesh.elements) mark(element.nodes);
+  for (const std::vector<int>& group : connected_groups(mesh)) mark(group);
+  return used;
+}
+
+void validate_nodes(const Mesh& mesh, const std::vector<int>& nodes) {
   require(!nodes.empty(), "has no node");
-  for (int node : nodes) require(node >= 0 && node < mesh.nodes.cols(), fmt::format("node {} is missing", node));
+  for (const int node : nodes) require_node(mesh, node);
 }
 
-}  // namespace
-
-double BeamGeometry::length() const {
-  return std::accumulate(segments.begin(), segments.end(), 0.0,
-                         [](double sum, const BeamSegment& segment) { return sum + segment.length; });
-}
-
-void BeamGeometry::validate() const {
-  require(!segments.empty(), "segments: a boom needs at least one");
-  validate_order(order);
-  for (size_t i = 0; i < segments.size(); ++i) {
-    within(fmt::format("segments[{}]", i), [&] { validate_segment(segments[i], *this); });
-  }
-  std::set<std::string> names = {"root", "tip"};
-  double mass = 0;
-  for (size_t i = 0; i < attachments.size(); ++i) {
-    within(fmt::format("attachments[{}]", i), [&] {
-      validate_attachment(attachments[i], length());
-      const std::string& name = attachments[i].name;
-      require(name.empty() || names.insert(name).second, fmt::format("name \"{}\" is taken; choose another", name));
+void validate_connections(const Mesh& mesh) {
+  for (size_t i = 0; i < mesh.rigid_connections.size(); ++i) {
+    const RigidConnection& c = mesh.rigid_connections[i];
+    within(fmt::format("rigid_connections[{}]", i), [&] {
+      require_node(mesh, c.reference);
+      validate_nodes(mesh, c.nodes);
     });
-    mass += attachments[i].mass;
   }
-  for (const BeamSegment& segment : segments) mass += segment.material.rho;
-  require(mass > 0, "the boom has no mass: rho is zero in every segment and nothing with mass is attached");
+  for (size_t i = 0; i < mesh.distributing_connections.size(); ++i) {
+    const DistributingConnection& c = mesh.distributing_connections[i];
+    within(fmt::format("distributing_connections[{}]", i), [&] {
+      require_node(mesh, c.reference);
+      validate_nodes(mesh, c.nodes);
+      require(c.weights.size() == c.nodes.size(), "needs one weight per node");
+      for (const double w : c.weights) require(std::isfinite(w) && w > 0, fmt::format("weight {} must be positive", w));
+    });
+  }
+  for (size_t i = 0; i < mesh.equations.size(); ++i) {
+    within(fmt::format("equations[{}]", i), [&] {
+      require(!mesh.equations[i].terms.empty(), "has no term");
+      for (const LinearEquation::Term& term : mesh.equations[i].terms) {
+        require_node(mesh, term.node);
+        require(term.component >= 0 && term.component < 6, fmt::format("component {} must be 0 to 5", term.component));
+        require(std::isfinite(term.coefficient), "has a coefficient that is not finite");
+      }
+    });
+  }
 }
 
-Mesh make_mesh(const BeamGeometry& boom) {
-  boom.validate();
-  Chain chain;
-  double start = 0;
-  for (const BeamSegment& segment : boom.segments) {
-    append_segment(chain, boom, segment, start);
-    start += segment.length;
-  }
-  Mesh mesh = std::move(chain.mesh);
-  mesh.nodes.setZero(3, static_cast<Eigen::Index>(chain.x.size()));
-  mesh.nodes.row(0) = Eigen::Map<const Eigen::RowVectorXd>(chain.x.data(), static_cast<Eigen::Index>(chain.x.size()));
-  mesh.node_sets = {{"root", {0}}, {"tip", {static_cast<int>(chain.x.size()) - 1}}};
-  for (const RigidAttachment& attachment : boom.attachments) {
-    const int node = nearest_node(chain.x, attachment.position);
-    mesh.bodies.push_back({node, attachment.mass, attachment.inertia, attachment.offset});
-    if (!attachment.name.empty()) mesh.node_sets[attachment.name] = {node};
-  }
-  return mesh;
-}
-
-void Mesh::validate() const {
-  require(nodes.cols() > 0 && !elements.empty(), "mesh: has no elements");
-  for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
-    require(nodes.col(i).allFinite(), fmt::format("mesh: nodes[{}] has a coordinate that is not finite", i));
-  }
-  for (size_t i = 0; i < beam_properties.size(); ++i) {
-    within(fmt::format("mesh: beam_properties[{}]", i), [&] {
-      const BeamProperty& property = beam_properties[i];
+void validate_properties(const Mesh& mesh) {
+  for (size_t i = 0; i < mesh.beam_properties.size(); ++i) {
+    within(fmt::format("beam_properties[{}]", i), [&] {
+      const BeamProperty& property = mesh.beam_properties[i];
       property.material.validate();
       validate_sections(property.start, property.end, property.material, property.theory, property.shear);
     });
   }
-  for (size_t i = 0; i < elements.size(); ++i) {
-    within(fmt::format("mesh: elements[{}]", i), [&] { validate_element(*this, elements[i]); });
-  }
-  within("mesh", [&] { validate_connections(*this); });
-  for (size_t i = 0; i < bodies.size(); ++i) {
-    within(fmt::format("mesh: bodies[{}]", i), [&] {
-      validate_set(*this, {bodies[i].node});
-      validate_rigid(bodies[i].mass, bodies[i].inertia, bodies[i].offset);
+  for (const SolidProperty& property : mesh.solid_properties) {
+    within(fmt::format("material of \"{}\"", property.name), [&] {
+      require(property.material.E != 0, "is missing; give E, nu and rho (--material E,nu,rho)");
+      property.material.validate();
     });
   }
-  for (const auto& set : node_sets) {
-    within(fmt::format("mesh: node set \"{}\"", set.first), [&] { validate_set(*this, set.second); });
+}
+
+void validate_content(const Mesh& mesh) {
+  for (Index i = 0; i < mesh.nodes.cols(); ++i) {
+    require(mesh.nodes.col(i).allFinite(),
+            fmt::format("node {} has a coordinate that is not finite", mesh.node_label(static_cast<int>(i))));
   }
+  validate_properties(mesh);
+  for (int e = 0; e < std::ssize(mesh.elements); ++e) validate_element(mesh, e);
+  validate_connections(mesh);
+  for (size_t i = 0; i < mesh.bodies.size(); ++i) {
+    within(fmt::format("bodies[{}]", i), [&] {
+      require_node(mesh, mesh.bodies[i].node);
+      validate_rigid(mesh.bodies[i].mass, mesh.bodies[i].inertia, mesh.bodies[i].offset);
+    });
+  }
+  for (const Support& support : mesh.supports) within("supports", [&] { require_node(mesh, support.node); });
+  for (const auto& set : mesh.node_sets) {
+    within(fmt::format("node set \"{}\"", set.first), [&] { validate_nodes(mesh, set.second); });
+  }
+  const std::vector<char> used = used_nodes(mesh);
+  for (Index i = 0; i < mesh.nodes.cols(); ++i) {
+    require(used[static_cast<size_t>(i)],
+            fmt::format("node {} belongs to no element", mesh.node_label(static_cast<int>(i))));
+  }
+}
+
+/// Pairs of nodes at one place to round-off of the mesh's size, joined by nothing.
+int coincident_nodes(const Mesh& mesh) {
+  const Vector3d extent = mesh.nodes.rowwise().maxCoeff() - mesh.nodes.rowwise().minCoeff();
+  const double tolerance = 1e-9 * extent.norm();
+  Index axis = 0;
+  extent.maxCoeff(&axis);
+  std::vector<int> order(static_cast<size_t>(mesh.nodes.cols()));
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::sort(order, {}, [&](int node) { return mesh.nodes(axis, node); });
+  Parts joined(mesh.nodes.cols());
+  for (const std::vector<int>& group : connected_groups(mesh)) {
+    for (const int node : group) joined.join(node, group.front());
+  }
+  int count = 0;
+  for (size_t i = 0; i < order.size(); ++i) {
+    const Vector3d here = mesh.nodes.col(order[i]);
+    for (size_t k = i + 1; k < order.size() && mesh.nodes(axis, order[k]) - here(axis) <= tolerance; ++k) {
+      const bool same = (mesh.nodes.col(order[k]) - here).norm() <= tolerance;
+      count += same && joined.root(order[i]) != joined.root(order[k]);
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
+long Mesh::node_label(int node) const { return node_labels.empty() ? node : node_labels[static_cast<size_t>(node)]; }
+
+long Mesh::element_label(int element) const {
+  return element_labels.empty() ? element : element_labels[static_cast<size_t>(element)];
+}
+
+void Mesh::validate() const {
+  require(nodes.cols() > 0 && !elements.empty(), "mesh: has no elements");
+  within("mesh", [this] { validate_content(*this); });
 }
 
 const std::vector<int>& node_set(const Mesh& mesh, const std::string& name) {
@@ -270,7 +204,49 @@ const std::vector<int>& node_set(const Mesh& mesh, const std::string& name) {
   if (found != mesh.node_sets.end()) return found->second;
   std::vector<std::string> names;
   for (const auto& [known, nodes] : mesh.node_sets) names.push_back(fmt::format("\"{}\"", known));
-  throw InputError(fmt::format("node set \"{}\" not found; the mesh has {}", name, fmt::join(names, ", ")));
+  throw InputError(fmt::format("node set \"{}\" not found; the mesh has {}", name,
+                               names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+}
+
+int part_count(const Mesh& mesh) {
+  Parts parts(mesh.nodes.cols());
+  for (const Element& element : mesh.elements) {
+    for (const int node : element.nodes) parts.join(node, element.nodes.front());
+  }
+  for (const std::vector<int>& group : connected_groups(mesh)) {
+    for (const int node : group) parts.join(node, group.front());
+  }
+  const std::vector<char> used = used_nodes(mesh);
+  int count = 0;
+  for (int node = 0; node < mesh.nodes.cols(); ++node)
+    count += used[static_cast<size_t>(node)] && parts.root(node) == node;
+  return count;
+}
+
+std::vector<std::string> suspicions(const Mesh& mesh) {
+  std::vector<std::string> result;
+  if (const int parts = part_count(mesh); parts > 1)
+    result.push_back(fmt::format("the mesh has {} parts that nothing joins; each moves on its own", parts));
+  if (const int twins = coincident_nodes(mesh); twins > 0)
+    result.push_back(
+        fmt::format("{} pairs of nodes lie at one place and nothing joins them: the mesh is open there "
+                    "(merge them if it should not be)",
+                    twins));
+  // Solids of technology weigh 1 to 23 000 kg/m^3 and are stiffer than 1 kPa and softer than diamond (1.2 TPa).
+  const auto judge = [&result](const std::string& where, const Material& m) {
+    const bool absurd = (m.rho > 0 && (m.rho < 1 || m.rho > 3e4)) || m.E < 1e3 || m.E > 2e12;
+    if (absurd)
+      result.push_back(
+          fmt::format("{}: E = {:g}, rho = {:g} is no material in Pa and kg/m^3; are the units mixed up "
+                      "(N, mm, t give Hz as well, but say so to yourself)?",
+                      where, m.E, m.rho));
+  };
+  for (const SolidProperty& property : mesh.solid_properties) judge("\"" + property.name + "\"", property.material);
+  for (size_t i = 0; i < mesh.beam_properties.size(); ++i) {
+    const bool repeated = i > 0 && mesh.beam_properties[i].material.E == mesh.beam_properties[i - 1].material.E;
+    if (!repeated) judge(fmt::format("beam property {}", i), mesh.beam_properties[i].material);
+  }
+  return result;
 }
 
 }  // namespace flexboom

@@ -1,34 +1,56 @@
 #pragma once
 
-#include "fem/assembly.hpp"
-
-#include <Eigen/Core>
+#include "fem/sparse.hpp"
 
 #include <memory>
+#include <string>
 
 namespace flexboom {
 
-/// L D L^T of a sparse symmetric matrix through CHOLMOD (its only door). The symbolic analysis is made once and reused
-/// by every refactor with the same pattern.
+/// `indefinite`: L D L^T column by column, which counts negative pivots. `definite`: L L^T in dense blocks, many times
+/// faster, for positive definite matrices only.
+enum class FactorKind { indefinite, definite };
+
+/// What a factor is and what it cost.
+struct FactorSummary {
+  std::string ordering;        // Ordering::name
+  long nonzeros = 0;           // entries of L
+  double flops = 0;            // of one factorisation
+  double bytes = 0;            // of L
+  double analyse_seconds = 0;  // ordering and symbolic analysis, once
+  double factor_seconds = 0;   // the last factorisation
+};
+
+/// Factor of a sparse symmetric matrix through CHOLMOD (its only door but for orderings). The symbolic analysis is made
+/// once and reused by every refactor with the same pattern.
 class SparseFactor {
  public:
-  /// Analyses the pattern of a symmetric matrix (both triangles stored; the lower one is read).
-  explicit SparseFactor(const SparseMatrix& pattern);
+  /// Analyses the pattern of a symmetric matrix; the lower triangle is read.
+  explicit SparseFactor(const SparseMatrix& pattern, FactorKind = FactorKind::indefinite);
   ~SparseFactor();
   SparseFactor(SparseFactor&&) noexcept;
   SparseFactor& operator=(SparseFactor&&) noexcept;
 
-  /// Factorises A (same pattern). @throws NumericalError when a zero pivot makes L D L^T impossible.
+  /// Factorises A (same pattern). @throws NumericalError when a pivot is zero or, of a definite one, not positive.
   void factorise(const SparseMatrix& A);
 
-  /// x = A^-1 b.
-  void solve(const Eigen::Ref<const Eigen::VectorXd>& b, Eigen::Ref<Eigen::VectorXd> x) const;
+  /// X = A^-1 B for any number of columns; 12 of them cost what 2 or 3 alone do. X may be B itself. Work space is kept
+  /// from call to call: not for two threads at once.
+  void solve(const Eigen::Ref<const Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd> X) const;
 
-  /// Number of negative entries of D: the eigenvalues of A below zero (Sylvester).
+  /// Number of negative entries of D: the eigenvalues of A below zero (Sylvester). Zero of a definite factor.
   int negative_pivots() const;
 
-  /// Entries of the factor.
-  long nonzeros() const;
+  /// Rough reciprocal condition number, from the diagonal of the factor.
+  double rcond_estimate() const;
+
+  FactorKind kind() const;
+
+  /// "5.1.2", of CHOLMOD.
+  static std::string library_release();
+
+  FactorSummary summary() const;
+  long nonzeros() const { return summary().nonzeros; }
 
  private:
   struct Impl;

@@ -1,17 +1,23 @@
 #include "fem/vtk.hpp"
 
+#include "fem/base64.hpp"
 #include "fem/check.hpp"
 #include "fem/files.hpp"
 
 #include <fmt/format.h>
 
+#include <bit>
+#include <cstdint>
 #include <iterator>
 
 namespace flexboom {
 namespace {
 
 using Field = std::pair<std::string, Eigen::MatrixXd>;
+using Group = std::pair<std::string, std::vector<int>>;
 using Text = std::string;
+
+constexpr Eigen::Index most_ascii_points = 10000;
 
 auto end_of(Text& text) { return std::back_inserter(text); }
 
@@ -32,35 +38,77 @@ Text escaped(const Text& name) {
   return result;
 }
 
-// One line per column, 17 significant digits.
-void append_array(Text& text, const Text& name, const Eigen::Ref<const Eigen::MatrixXd>& values) {
-  fmt::format_to(end_of(text), "<DataArray type=\"Float64\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"ascii\">\n",
-                 escaped(name), values.rows());
-  for (Eigen::Index j = 0; j < values.cols(); ++j) {
-    for (Eigen::Index i = 0; i < values.rows(); ++i) fmt::format_to(end_of(text), "{:.17g} ", values(i, j));
-    text.back() = '\n';
+/// Appends data arrays, as text or as base64 of a count of bytes and the bytes.
+struct ArrayWriter {
+  Text& text;
+  bool binary;
+
+  template <class Number>
+  void append(std::string_view type, const Text& name, Eigen::Index components, const std::vector<Number>& values) {
+    fmt::format_to(end_of(text), "<DataArray type=\"{}\" Name=\"{}\"", type, escaped(name));
+    if (components > 0) fmt::format_to(end_of(text), " NumberOfComponents=\"{}\"", components);
+    fmt::format_to(end_of(text), " format=\"{}\">\n", binary ? "binary" : "ascii");
+    binary ? append_binary(values) : append_text(components, values);
+    text += "</DataArray>\n";
   }
-  text += "</DataArray>\n";
+
+ private:
+  // One line per point or cell (connectivity: 20 numbers, cells differ in length), 17 significant digits.
+  template <class Number>
+  void append_text(Eigen::Index components, const std::vector<Number>& values) {
+    const Eigen::Index line = components > 0 ? components : 20;
+    Eigen::Index in_line = 0;
+    for (const Number value : values) {
+      if constexpr (std::is_floating_point_v<Number>)
+        fmt::format_to(end_of(text), "{:.17g} ", value);
+      else
+        fmt::format_to(end_of(text), "{} ", value);
+      if (++in_line < line) continue;
+      text.back() = '\n';
+      in_line = 0;
+    }
+    if (in_line > 0) text.back() = '\n';
+  }
+
+  template <class Number>
+  void append_binary(const std::vector<Number>& values) {
+    const std::uint64_t size = values.size() * sizeof(Number);
+    std::string bytes(reinterpret_cast<const char*>(&size), sizeof(size));
+    bytes.append(reinterpret_cast<const char*>(values.data()), size);
+    text += base64(bytes);
+    text += '\n';
+  }
+};
+
+void append_field(ArrayWriter& out, const Text& name, const Eigen::MatrixXd& values) {
+  out.append("Float64", name, values.rows(), std::vector<double>(values.data(), values.data() + values.size()));
 }
 
-void append_fields(Text& text, const char* tag, const std::vector<Field>& fields) {
-  fmt::format_to(end_of(text), "<{}>\n", tag);
-  for (const auto& [name, values] : fields) append_array(text, name, values);
-  fmt::format_to(end_of(text), "</{}>\n", tag);
+void append_fields(ArrayWriter& out, const char* tag, const std::vector<Field>& fields,
+                   const std::vector<Group>& groups, size_t count) {
+  fmt::format_to(end_of(out.text), "<{}>\n", tag);
+  for (const auto& [name, values] : fields) append_field(out, name, values);
+  for (const auto& [name, members] : groups) {
+    std::vector<std::uint8_t> values(count, 0);
+    for (const int member : members) values[static_cast<size_t>(member)] = 1;
+    out.append("UInt8", name, 1, values);
+  }
+  fmt::format_to(end_of(out.text), "</{}>\n", tag);
 }
 
-void append_cells(Text& text, const std::vector<VtkGrid::Cell>& cells) {
-  text += "<Cells>\n<DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">\n";
+void append_cells(ArrayWriter& out, const std::vector<VtkGrid::Cell>& cells) {
+  std::vector<std::int64_t> points, offsets;
+  std::vector<std::uint8_t> types;
   for (const VtkGrid::Cell& cell : cells) {
-    for (int point : cell.points) fmt::format_to(end_of(text), "{} ", point);
-    text.back() = '\n';
+    points.insert(points.end(), cell.points.begin(), cell.points.end());
+    offsets.push_back(static_cast<std::int64_t>(points.size()));
+    types.push_back(static_cast<std::uint8_t>(cell.type));
   }
-  text += "</DataArray>\n<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">\n";
-  size_t offset = 0;
-  for (const VtkGrid::Cell& cell : cells) fmt::format_to(end_of(text), "{}\n", offset += cell.points.size());
-  text += "</DataArray>\n<DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">\n";
-  for (const VtkGrid::Cell& cell : cells) fmt::format_to(end_of(text), "{}\n", cell.type);
-  text += "</DataArray>\n</Cells>\n";
+  out.text += "<Cells>\n";
+  out.append("Int64", "connectivity", 0, points);
+  out.append("Int64", "offsets", 1, offsets);
+  out.append("UInt8", "types", 1, types);
+  out.text += "</Cells>\n";
 }
 
 void validate_fields(const char* where, const std::vector<Field>& fields, Eigen::Index count) {
@@ -69,6 +117,13 @@ void validate_fields(const char* where, const std::vector<Field>& fields, Eigen:
             fmt::format("{} field \"{}\" is {} x {}; it must have {} columns", where, name, values.rows(),
                         values.cols(), count));
     require(values.allFinite(), fmt::format("{} field \"{}\" has a value that is not finite", where, name));
+  }
+}
+
+void validate_groups(const char* where, const std::vector<Group>& groups, Eigen::Index count) {
+  for (const auto& [name, members] : groups) {
+    for (const int member : members)
+      require(member >= 0 && member < count, fmt::format("{} group \"{}\": {} is missing", where, name, member));
   }
 }
 
@@ -83,8 +138,11 @@ void validate(const VtkGrid& grid) {
       require(point >= 0 && point < grid.points.cols(), fmt::format("cell {}: point {} is missing", i, point));
     }
   }
+  const auto cells = static_cast<Eigen::Index>(grid.cells.size());
   validate_fields("point", grid.point_data, grid.points.cols());
-  validate_fields("cell", grid.cell_data, static_cast<Eigen::Index>(grid.cells.size()));
+  validate_fields("cell", grid.cell_data, cells);
+  validate_groups("point", grid.point_groups, grid.points.cols());
+  validate_groups("cell", grid.cell_groups, cells);
 }
 
 }  // namespace
@@ -95,16 +153,20 @@ void write_vtu(const std::filesystem::path& path, const VtkGrid& grid) {
   } catch (const InputError& error) {
     throw InputError(fmt::format("cannot write {}: {}", path.string(), error.what()));
   }
-  Text text =
-      "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
-      "header_type=\"UInt64\">\n<UnstructuredGrid>\n";
+  const bool little = std::endian::native == std::endian::little;
+  // Version 1.0 is the highest that meshio 5.0 opens.
+  Text text = fmt::format(
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"{}Endian\" "
+      "header_type=\"UInt64\">\n<UnstructuredGrid>\n",
+      little ? "Little" : "Big");
   fmt::format_to(end_of(text), "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n<Points>\n", grid.points.cols(),
                  grid.cells.size());
-  append_array(text, "Points", grid.points);
+  ArrayWriter out{text, grid.points.cols() > most_ascii_points};
+  append_field(out, "Points", grid.points);
   text += "</Points>\n";
-  append_cells(text, grid.cells);
-  append_fields(text, "PointData", grid.point_data);
-  append_fields(text, "CellData", grid.cell_data);
+  append_cells(out, grid.cells);
+  append_fields(out, "PointData", grid.point_data, grid.point_groups, static_cast<size_t>(grid.points.cols()));
+  append_fields(out, "CellData", grid.cell_data, grid.cell_groups, grid.cells.size());
   text += "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
   write_file(path, text);
 }

@@ -1,5 +1,6 @@
 #include "fem/check.hpp"
 #include "reduction/eigen_backends.hpp"
+#include "reduction/eigen_basis.hpp"
 
 #include <arpack/arpack.hpp>
 
@@ -10,13 +11,15 @@
 namespace flexboom {
 namespace {
 
+constexpr double tolerance_of_many = 1e-10;  // machine precision takes twice the solves
+
 /// The state of one dsaupd iteration: what ARPACK keeps between its returns to the caller.
 struct Lanczos {
-  Lanczos(int n_in, int nev_in)
+  Lanczos(int n_in, int nev_in, int most)
       : n(n_in),
         nev(nev_in),
-        ncv(lanczos_vectors(nev_in, n_in)),
-        residual(start_vector(n_in)),
+        ncv(lanczos_vectors(nev_in, most)),
+        residual(random_block(n_in, 1, 20201116)),
         V(n_in, ncv),
         work(3 * n_in),
         work_l(ncv * (ncv + 8)) {
@@ -24,17 +27,6 @@ struct Lanczos {
     iparam[2] = 500;  // restarts allowed
     iparam[3] = 1;    // block size, the only one there is
     iparam[6] = 3;    // mode: shift-invert
-  }
-
-  /// The same pseudo-random numbers every time (Park-Miller), so that runs repeat to the last digit.
-  static Eigen::VectorXd start_vector(int n) {
-    Eigen::VectorXd v(n);
-    unsigned long state = 20201116;
-    for (double& entry : v) {
-      state = state * 48271 % 2147483647;
-      entry = static_cast<double>(state) / 2147483647 - 0.5;
-    }
-    return v;
   }
 
   a_int n;
@@ -70,14 +62,14 @@ int iterate(Lanczos& a, const EigenProblem& problem, const SparseFactor& shifted
                   a.work_l.data(), static_cast<a_int>(a.work_l.size()), a.info);
     if (ido == -1 || ido == 1) {
       if (ido == -1) {
-        b.noalias() = problem.M * slot(0);
+        symmetric_product(problem.M, slot(0), b);
       } else {
         b = slot(2);  // M x is there already
       }
       shifted.solve(b, slot(1));
       ++solves;
     } else if (ido == 2) {
-      slot(1) = problem.M * slot(0);
+      symmetric_product(problem.M, slot(0), slot(1));
     } else if (ido != 99) {
       throw NumericalError("ARPACK dsaupd: unexpected request " + std::to_string(ido));
     }
@@ -88,9 +80,11 @@ int iterate(Lanczos& a, const EigenProblem& problem, const SparseFactor& shifted
 
 }  // namespace
 
-EigenPairs arpack_modes(const EigenProblem& problem, const SparseFactor& shifted, double sigma, int count,
-                        double tolerance) {
-  Lanczos a(static_cast<int>(problem.K.rows()), count);
+EigenPairs arpack_modes(const EigenProblem& problem, const SparseFactor& shifted, const EigenRequest& request) {
+  const int count = request.count;
+  const auto n = static_cast<int>(problem.K.rows());
+  const double tolerance = request.tolerance > 0 || n < many_unknowns ? request.tolerance : tolerance_of_many;
+  Lanczos a(n, count, static_cast<int>((problem.M.diagonal().array() > 0).count()));
   EigenPairs pairs;
   pairs.summary.solves = iterate(a, problem, shifted, tolerance);
   pairs.summary.iterations = a.iparam[2];
@@ -101,10 +95,10 @@ EigenPairs arpack_modes(const EigenProblem& problem, const SparseFactor& shifted
   pairs.lambda.resize(count);
   pairs.Phi.resize(a.n, count);
   std::vector<a_int> select(static_cast<size_t>(a.ncv));
-  arpack::seupd(1, arpack::howmny::ritz_vectors, select.data(), pairs.lambda.data(), pairs.Phi.data(), a.n, sigma,
-                arpack::bmat::generalized, a.n, arpack::which::largest_algebraic, a.nev, tolerance, a.residual.data(),
-                a.ncv, a.V.data(), a.n, a.iparam.data(), a.ipntr.data(), a.work.data(), a.work_l.data(),
-                static_cast<a_int>(a.work_l.size()), a.info);
+  arpack::seupd(1, arpack::howmny::ritz_vectors, select.data(), pairs.lambda.data(), pairs.Phi.data(), a.n,
+                request.sigma, arpack::bmat::generalized, a.n, arpack::which::largest_algebraic, a.nev, tolerance,
+                a.residual.data(), a.ncv, a.V.data(), a.n, a.iparam.data(), a.ipntr.data(), a.work.data(),
+                a.work_l.data(), static_cast<a_int>(a.work_l.size()), a.info);
   check_code(a.info, "dseupd");
   return pairs;
 }

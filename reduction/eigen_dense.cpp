@@ -4,17 +4,17 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include <limits>
-#include <string>
+#include <algorithm>
 
 namespace flexboom {
 
 // With K - sigma M = L L^T the problem becomes L^-1 M L^-T y = nu y, nu = 1 / (omega^2 - sigma), phi = L^-T y: the
 // lowest modes are the largest nu, which the QR algorithm gives to full relative precision, and a singular M only adds
 // nu = 0.
-EigenPairs dense_modes(const EigenProblem& problem, const SparseFactor&, double sigma, int count, double) {
-  const Eigen::MatrixXd M = problem.M;
-  const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::MatrixXd(problem.K) - sigma * M);
+EigenPairs dense_modes(const EigenProblem& problem, const SparseFactor&, const EigenRequest& request) {
+  const double sigma = request.sigma;
+  const Eigen::MatrixXd M = Eigen::MatrixXd(problem.M).selfadjointView<Eigen::Lower>();
+  const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::MatrixXd(problem.K) - sigma * M);  // reads the lower triangle
   if (llt.info() != Eigen::Success) {
     throw NumericalError("dense: K - sigma M is not positive definite, the shift is not below the lowest eigenvalue");
   }
@@ -24,16 +24,13 @@ EigenPairs dense_modes(const EigenProblem& problem, const SparseFactor&, double 
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen((C + C.transpose()) / 2);
   if (eigen.info() != Eigen::Success) throw NumericalError("dense: the QR algorithm did not converge");
 
-  const Eigen::VectorXd nu = eigen.eigenvalues().tail(count).reverse();
-  const double smallest = static_cast<double>(M.rows()) * std::numeric_limits<double>::epsilon() * nu(0);
-  if (nu(count - 1) <= smallest) {
-    throw NumericalError("dense: fewer than " + std::to_string(count) +
-                         " finite eigenvalues, the mass matrix is singular");
-  }
+  const Eigen::VectorXd nu = eigen.eigenvalues().reverse();
+  const Eigen::Index count = std::min<Eigen::Index>(request.count, (nu.array() > infinite_nu * nu(0)).count());
+  if (count < request.wanted) throw_too_few_eigenvalues(problem, nu(0), count, request.wanted);
   EigenPairs pairs;
-  pairs.lambda = sigma + nu.array().inverse();
+  pairs.lambda = sigma + nu.head(count).array().inverse();
   pairs.Phi = llt.matrixU().solve(eigen.eigenvectors().rightCols(count).rowwise().reverse());
-  pairs.Phi *= nu.cwiseSqrt().cwiseInverse().asDiagonal();
+  pairs.Phi *= nu.head(count).cwiseSqrt().cwiseInverse().asDiagonal();
   return pairs;
 }
 

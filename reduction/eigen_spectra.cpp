@@ -38,7 +38,7 @@ class MassProduct {
   Eigen::Index rows() const { return M_.rows(); }
   Eigen::Index cols() const { return M_.cols(); }
   void perform_op(const double* x, double* y) const {
-    Eigen::Map<Eigen::VectorXd>(y, M_.rows()).noalias() = M_ * Eigen::Map<const Eigen::VectorXd>(x, M_.cols());
+    symmetric_product(M_, Eigen::Map<const Eigen::VectorXd>(x, M_.cols()), Eigen::Map<Eigen::VectorXd>(y, M_.rows()));
   }
 
  private:
@@ -61,13 +61,14 @@ int iterate(Solver& solver, double tolerance) {
 
 }  // namespace
 
-EigenPairs spectra_modes(const EigenProblem& problem, const SparseFactor& shifted, double sigma, int count,
-                         double tolerance) {
+EigenPairs spectra_modes(const EigenProblem& problem, const SparseFactor& shifted, const EigenRequest& request) {
+  const int count = request.count;
   const auto n = static_cast<int>(problem.K.rows());
+  const auto with_mass = static_cast<int>((problem.M.diagonal().array() > 0).count());
   ShiftedInverse inverse(shifted, n);
   MassProduct mass(problem.M);
-  Solver solver(inverse, mass, count, lanczos_vectors(count, n), sigma);
-  const int converged = iterate(solver, tolerance);
+  Solver solver(inverse, mass, count, lanczos_vectors(count, with_mass), request.sigma);
+  const int converged = iterate(solver, request.tolerance);
   if (solver.info() != Spectra::CompInfo::Successful || converged < count) {
     throw NumericalError("Spectra: " + std::to_string(converged) + " of " + std::to_string(count) +
                          " eigenvalues converged");

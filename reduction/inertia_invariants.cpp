@@ -67,21 +67,21 @@ MatrixXd reduced_stiffness(const Mesh& mesh, const DofMap& dofs, const MatrixXd&
   for (size_t e = 0; e < mesh.elements.size(); ++e) {
     const Element& element = mesh.elements[e];
     const MatrixXd shapes = Phi(dofs.of_element(mesh, static_cast<int>(e)), Eigen::all);
-    element_types()[static_cast<size_t>(element.type)].strain_points(
-        mesh, element, [&](double weight, const MatrixXd& B, const MatrixXd& D) {
-          const MatrixXd strain = B * shapes;
-          Ke.noalias() += weight * strain.transpose() * D * strain;
-        });
+    type_of(element).strain_points(mesh, element, [&](double weight, const MatrixXd& B, const MatrixXd& D) {
+      const MatrixXd strain = B * shapes;
+      Ke.noalias() += weight * strain.transpose() * D * strain;
+    });
   }
   return (Ke + Ke.transpose()) / 2;
 }
 
 /// A marker at the node of every node set that has one node.
-std::vector<Marker> node_markers(const Mesh& mesh, const MatrixXd& Phi) {
+std::vector<Marker> node_markers(const Mesh& mesh, const DofMap& dofs, const MatrixXd& Phi) {
   std::vector<Marker> markers;
   for (const auto& [name, nodes] : mesh.node_sets) {
     if (nodes.size() != 1) continue;
-    const int first = DofMap::of_node(nodes.front(), 0);
+    if (dofs.freedoms_of(nodes.front()) < 6) continue;  // a node of solids has no rotation
+    const int first = dofs.of_node(nodes.front(), 0);
     markers.push_back({name, mesh.nodes.col(nodes.front()), Phi.middleRows<3>(first), Phi.middleRows<3>(first + 3)});
   }
   return markers;
@@ -93,7 +93,7 @@ DisplayShape display_shape(const Mesh& mesh, const DofMap& dofs, const MatrixXd&
   DisplayShape display;
   for (size_t i = 0; i < lines.element.size(); ++i) {
     const Element& element = mesh.elements[static_cast<size_t>(lines.element[i])];
-    const auto N = element_types()[static_cast<size_t>(element.type)].interpolation(mesh, element, lines.parameter[i]);
+    const auto N = type_of(element).interpolation(mesh, element, {lines.parameter[i], 0, 0});
     display.S.emplace_back(N.topRows<3>() * Phi(dofs.of_element(mesh, lines.element[i]), Eigen::all));
   }
   display.points = std::move(lines.points);
@@ -200,7 +200,7 @@ void check_by_rigid_motions(CheckList& list, const ReducedBody& body, const Mesh
                             const ModalBasis& basis) {
   const Scales s = scales_of(body);
   const MatrixXd T = rigid_motions(mesh, assembly.dofs);
-  const MatrixXd M_T = assembly.M * T;
+  const MatrixXd M_T = symmetric_product(assembly.M, T);
   const MatrixXd rigid = T.transpose() * M_T;
   const MatrixXd coupling = M_T.transpose() * basis.Phi;
   list.compare("m = t^T M t", body.m * Matrix3d::Identity(), rigid.topLeftCorner<3, 3>(), body.m);
@@ -208,7 +208,7 @@ void check_by_rigid_motions(CheckList& list, const ReducedBody& body, const Mesh
   list.compare("J0 = r^T M r", body.J0, rigid.bottomRightCorner<3, 3>(), s.inertia);
   list.compare("Ct = t^T M Phi", body.Ct, coupling.topRows(3), std::sqrt(body.m * s.modal));
   list.compare("Cr0 = r^T M Phi", body.Cr0, coupling.bottomRows(3), std::sqrt(s.inertia * s.modal));
-  list.compare("Me = Phi^T M Phi", body.Me, basis.Phi.transpose() * (assembly.M * basis.Phi), s.modal);
+  list.compare("Me = Phi^T M Phi", body.Me, quadratic_form(assembly.M, basis.Phi), s.modal);
 }
 
 /// Each integral as it is defined, by a finer quadrature.
@@ -276,7 +276,7 @@ ReducedBody reduce(const Mesh& mesh, const Assembly& assembly, const ModalBasis&
                                                        std::to_string(assembly.dofs.count) + ")");
   ReducedBody body = blank_body(std::move(name), static_cast<int>(basis.Phi.cols()));
   body.structure = "beam";
-  body.frame = basis.clamped ? "clamped" : "free";
+  body.frame = basis.rigid_freedoms == 0 ? "clamped" : "free";
   body.full_freedoms = basis.unknowns;
   set_inertia(body, gram_matrix(mesh, assembly.dofs, basis.Phi));
   body.Ke = reduced_stiffness(mesh, assembly.dofs, basis.Phi);
@@ -284,7 +284,7 @@ ReducedBody reduce(const Mesh& mesh, const Assembly& assembly, const ModalBasis&
     const std::string kind(name_of(basis.kind[static_cast<size_t>(k)]));
     body.coordinates.push_back({kind, basis.omega(k) / (2 * std::numbers::pi)});
   }
-  body.markers = node_markers(mesh, basis.Phi);
+  body.markers = node_markers(mesh, assembly.dofs, basis.Phi);
   body.display = display_shape(mesh, assembly.dofs, basis.Phi);
   body.validate();
   return body;

@@ -19,6 +19,7 @@ import time
 import unittest
 import xml.etree.ElementTree as ElementTree
 
+import meshio
 import numpy as np
 
 TESTS = pathlib.Path(__file__).resolve().parent.parent
@@ -199,8 +200,16 @@ class BadInput(Case):
     def test_modes_of_something_else(self):
         self.assert_refused("modes", "absent.toml", words="absent.toml")
         self.assert_refused("modes", MESHES / "sport.toml", words="flexboom-body-1")
-        for mesh in ("mesh.inp", "mesh.msh", "mesh.vtu"):
-            self.assert_refused("modes", mesh, words=".toml")
+        for mesh in ("mesh.inp", "mesh.msh", "mesh.vtu", "mesh.bdf"):
+            self.assert_refused("modes", mesh, words=mesh)
+        self.assert_refused("modes", "mesh.stl", words=".inp")
+
+    def test_options_that_are_for_bodies(self):
+        self.assert_refused("modes", "mesh.inp", "--order", "3", words="--order")
+        self.assert_refused("modes", BOOM4, "--accuracy", "1e-3", words="--structure solid")
+        self.assert_refused("modes", BOOM4, "--structure", "shell", words='"solid"')
+        self.assert_refused("modes", BOOM4, "--structure", "solid", "--order", "9", words="order")
+        self.assert_refused("mesh", BOOM4, "-o", "boom.stl", words=".vtu")
 
     def test_modes_options(self):
         self.assert_refused("modes", BOOM4, "--count", "100000", words="unknowns")
@@ -623,6 +632,51 @@ class Vtu(Case):
         for name, shape in mesh.point_data.items():
             self.assertTrue(np.isfinite(shape).all() and abs(shape).max() > 0, name)
             self.assertEqual(abs(shape[np.argmin(mesh.points[:, 0])]).max(), 0, "the root is clamped")
+
+
+class Solids(Case):
+    """Body to solid mesh, mesh from format to format, each with the same modes."""
+
+    def modes(self, *arguments):
+        result = flexboom("modes", *arguments, "--json", *([] if "--count" in arguments else ["--count", "6"]))
+        self.assert_exit(OK, result)
+        return json.loads(result.stdout)
+
+    def mesh(self, source, name, *arguments):
+        file = self.folder / name
+        self.assert_exit(OK, flexboom("mesh", source, "-o", file, "--quiet", *arguments))
+        return file
+
+    def test_a_solid_body_has_the_modes_of_three_dimensional_elasticity(self):
+        document = self.modes(BOOM4, "--structure", "solid", "--accuracy", "1e-4")
+        exact = [74.57570632384, 74.57570632384, 465.60850721105, 465.60850721105, 1296.0223559708, 1296.0223559708]
+        np.testing.assert_allclose(document["frequencies_hz"], exact, rtol=1e-4)
+        self.assertEqual(sorted(document["kinds"][:2]), ["bending_y", "bending_z"])
+        self.assertTrue(document["proof"])
+
+    def test_formats_hold_the_same_body(self):
+        clamp = ["--clamp", "root", "--material", "67e9,0.33,2840"]
+        deck = self.mesh(BOOM4, "boom.inp", "--structure", "solid", "--element", "hex20")
+        hz = np.array(self.modes(deck, *clamp)["frequencies_hz"])
+        for name in ("boom.msh", "boom.vtu", "again.inp"):
+            other = self.mesh(deck, name)
+            np.testing.assert_allclose(self.modes(other, *clamp)["frequencies_hz"], hz, rtol=1e-9, err_msg=name)
+
+    def test_nothing_held_is_a_free_body(self):
+        document = self.modes(BOOM4, "--structure", "solid", "--accuracy", "1e-2", "--free", "--count", "8")
+        self.assertEqual(document["rigid_freedoms"], 6)
+        self.assertEqual(document["kinds"][:6], ["rigid"] * 6)
+
+    def test_completeness_is_proven_when_asked(self):
+        arguments = (BOOM4, "--structure", "solid", "--accuracy", "1e-2")
+        self.assertGreaterEqual(self.modes(*arguments, "--verify", "sturm")["sturm_count"], 6)
+        self.assertIsNone(self.modes(*arguments, "--verify", "basic")["sturm_count"])
+
+    def test_shapes_are_written_for_every_mode(self):
+        file = self.folder / "shapes.vtu"
+        self.modes(BOOM4, "--structure", "solid", "--accuracy", "1e-2", "--vtu", file)
+        fields = meshio.read(file).point_data
+        self.assertEqual(sum(name.startswith("mode_") for name in fields), 6)
 
 
 class Modes(Case):

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "fem/assembly.hpp"
+#include "fem/boom.hpp"
 #include "fem/element.hpp"
-#include "fem/mesh.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
@@ -58,16 +58,36 @@ inline BeamGeometry uniform_boom(const SectionShape& section, double length, Bea
   return boom;
 }
 
+/// A symmetric matrix of which the lower triangle is stored.
+inline Eigen::MatrixXd full(const SparseMatrix& A) { return Eigen::MatrixXd(A).selfadjointView<Eigen::Lower>(); }
+
+inline Eigen::MatrixXd full(const SparseMatrix& A, const std::vector<int>& dofs) { return full(A)(dofs, dofs); }
+
+/// Freedoms left when all of the listed nodes are clamped and absent ones are dropped, ascending.
+inline std::vector<int> free_dofs(const DofMap& dofs, const std::vector<int>& clamped_nodes) {
+  std::vector<char> leaves = dofs.absent;
+  for (const int node : clamped_nodes) {
+    for (int k = 0; k < dofs.freedoms_of(node); ++k) leaves[static_cast<size_t>(dofs.of_node(node, k))] = 1;
+  }
+  std::vector<int> free;
+  for (int dof = 0; dof < dofs.count; ++dof) {
+    if (!leaves[static_cast<size_t>(dof)]) free.push_back(dof);
+  }
+  return free;
+}
+
 /// The free freedoms that K and M connect with the freedom `seed`: one bending plane, torsion or extension.
 inline std::vector<int> coupled_with(const Assembly& a, const std::vector<int>& free, int seed) {
   std::vector<char> allowed(static_cast<size_t>(a.dofs.count), 0), reached = allowed;
   for (int dof : free) allowed[static_cast<size_t>(dof)] = 1;
   std::vector<int> front = {seed};
   reached[static_cast<size_t>(seed)] = 1;
+  const SparseMatrix K = a.K.selfadjointView<Eigen::Lower>();
+  const SparseMatrix M = a.M.selfadjointView<Eigen::Lower>();
   while (!front.empty()) {
     const int j = front.back();
     front.pop_back();
-    for (const SparseMatrix* A : {&a.K, &a.M}) {
+    for (const SparseMatrix* A : {&K, &M}) {
       for (SparseMatrix::InnerIterator it(*A, j); it; ++it) {
         const auto i = static_cast<size_t>(it.row());
         if (!allowed[i] || reached[i]) continue;
@@ -87,7 +107,7 @@ inline std::vector<int> coupled_with(const Assembly& a, const std::vector<int>& 
 /// keeps the digits of the low end) and a Rayleigh quotient from element points.
 inline std::vector<double> dense_frequencies_hz(const Mesh& mesh, const Assembly& a, const std::vector<int>& dofs,
                                                 int count) {
-  const Eigen::MatrixXd K = submatrix(a.K, dofs), M = submatrix(a.M, dofs);
+  const Eigen::MatrixXd K = full(a.K, dofs), M = full(a.M, dofs);
   const Eigen::VectorXd scale = K.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * M * scale.asDiagonal(),
                                                                          scale.asDiagonal() * K * scale.asDiagonal());
@@ -96,8 +116,8 @@ inline std::vector<double> dense_frequencies_hz(const Mesh& mesh, const Assembly
     const Eigen::VectorXd phi = scale.asDiagonal() * solver.eigenvectors().col(K.cols() - 1 - k);
     Eigen::VectorXd u = Eigen::VectorXd::Zero(a.dofs.count);
     for (size_t i = 0; i < dofs.size(); ++i) u(dofs[i]) = phi(static_cast<Eigen::Index>(i));
-    const PointEnergies energy = point_energies(mesh, a.dofs, u);
-    frequencies.push_back(std::sqrt(energy.strain / energy.kinetic) / (2 * pi));
+    const PointEnergies energy = point_energies(mesh, a, u);
+    frequencies.push_back(std::sqrt(energy.strain(0) / energy.kinetic(0)) / (2 * pi));
   }
   return frequencies;
 }
@@ -108,7 +128,7 @@ inline std::vector<double> clamped_frequencies_hz(const BeamGeometry& boom, int 
   const Mesh mesh = make_mesh(boom);
   const Assembly a = assemble(mesh);
   const std::vector<int> free = free_dofs(a.dofs, node_set(mesh, "root"));
-  const int tip = DofMap::of_node(node_set(mesh, "tip")[0], component);
+  const int tip = a.dofs.of_node(node_set(mesh, "tip")[0], component);
   return dense_frequencies_hz(mesh, a, coupled_with(a, free, tip), count);
 }
 

@@ -1,5 +1,7 @@
 #include "fem_testing.hpp"
 
+#include <fmt/format.h>
+
 namespace flexboom::testing {
 namespace {
 
@@ -121,38 +123,67 @@ std::string mesh_fault(const std::function<void(Mesh&)>& spoil) {
 
 TEST(Mesh, BadInputSaysWhatIsWrong) {
   EXPECT_EQ(input_error([] { Mesh{}.validate(); }), "mesh: has no elements");
-  EXPECT_EQ(mesh_fault([](Mesh& m) { m.nodes(2, 3) = NAN; }), "mesh: nodes[3] has a coordinate that is not finite");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.nodes(2, 3) = NAN; }), "mesh: node 3 has a coordinate that is not finite");
   EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].nodes[1] = 99; }),
-            "mesh: elements[2]: node 99 is missing; the mesh has nodes 0 to 8");
+            "mesh: beam-timoshenko element 2: node 99 is missing; the mesh has nodes 0 to 8");
   EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].nodes.push_back(0); }),
-            "mesh: elements[2]: has 3 nodes; \"beam-timoshenko\" has 2");
-  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].type = 7; }),
-            "mesh: elements[2]: type 7 is not a row of the table of 2 elements");
+            "mesh: beam-timoshenko element 2: has 3 nodes; \"beam-timoshenko\" has 2");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].type = 77; }),
+            fmt::format("mesh: elements[2]: type 77 is not a row of the table of {} elements", element_types().size()));
   EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].type = element_type("beam-euler-bernoulli"); }),
-            "mesh: elements[2]: type \"beam-euler-bernoulli\" does not agree with the theory of its property");
+            "mesh: beam-euler-bernoulli element 2: type \"beam-euler-bernoulli\" does not agree with the theory of its "
+            "property");
   EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].property = -1; }),
-            "mesh: elements[2]: beam property -1 is missing; the mesh has 8");
-  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].order = 0; }), "mesh: elements[2]: order is 0; it must be 1 to 12");
-  EXPECT_EQ(mesh_fault([](Mesh& m) { m.nodes.col(1) = m.nodes.col(0); }), "mesh: elements[0]: beam of zero length");
+            "mesh: beam-timoshenko element 2: beam property -1 is missing; the mesh has 8");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements[2].order = 0; }),
+            "mesh: beam-timoshenko element 2: order is 0; it must be 1 to 12");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.nodes.col(1) = m.nodes.col(0); }),
+            "mesh: beam-timoshenko element 0: beam of zero length");
   EXPECT_EQ(mesh_fault([](Mesh& m) {
               m.beam_properties[0].y_axis = {2, 0, 0};
             }),
-            "mesh: elements[0]: the y axis of the section is parallel to the beam");
+            "mesh: beam-timoshenko element 0: the y axis of the section is parallel to the beam");
   EXPECT_EQ(mesh_fault([](Mesh& m) { m.beam_properties[1].start = RoundBar{-1}; }),
             "mesh: beam_properties[1]: start: round bar: diameter [m]: is -1; it must be positive");
   EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements.pop_back(); }), "mesh: node 8 belongs to no element");
-  EXPECT_EQ(mesh_fault([](Mesh& m) { m.elements.erase(m.elements.begin() + 3); }),
-            "mesh: node 4 is not connected with node 0: the mesh has several parts");
-  EXPECT_EQ(mesh_fault([](Mesh& m) { m.bodies[0].node = 42; }), "mesh: bodies[0]: node 42 is missing");
+  EXPECT_EQ(mesh_fault([](Mesh& m) { m.bodies[0].node = 42; }),
+            "mesh: bodies[0]: node 42 is missing; the mesh has nodes 0 to 8");
   EXPECT_EQ(mesh_fault([](Mesh& m) { m.bodies[0].mass = -1; }),
             "mesh: bodies[0]: mass is -1 kg; it must be zero or positive");
   EXPECT_EQ(mesh_fault([](Mesh& m) { m.node_sets["clamp"] = {}; }), "mesh: node set \"clamp\": has no node");
-  EXPECT_EQ(
-      mesh_fault([](Mesh& m) {
-        for (BeamProperty& p : m.beam_properties) p.rotary_inertia = false;
-        m.nodes(1, 8) = 0.01;
-      }),
-      "mesh: elements[7]: a beam without rotary inertia must run along an axis of the mesh (its torsion has no mass)");
+  EXPECT_EQ(mesh_fault([](Mesh& m) {
+              for (BeamProperty& p : m.beam_properties) p.rotary_inertia = false;
+              m.nodes(1, 8) = 0.01;
+            }),
+            "mesh: beam-timoshenko element 7: a beam without rotary inertia must run along an axis of the mesh (its "
+            "torsion has no mass)");
+}
+
+TEST(Mesh, PartsAreCountedAndSuspicious) {
+  Mesh mesh = make_mesh(two_segments());
+  EXPECT_EQ(part_count(mesh), 1);
+  EXPECT_TRUE(suspicions(mesh).empty());
+  mesh.elements.erase(mesh.elements.begin() + 3);
+  EXPECT_EQ(part_count(mesh), 2);
+  ASSERT_EQ(suspicions(mesh).size(), 1U);
+  EXPECT_EQ(suspicions(mesh)[0], "the mesh has 2 parts that nothing joins; each moves on its own");
+  mesh.rigid_connections = {{3, {4}, all_components}};
+  EXPECT_EQ(part_count(mesh), 1);
+}
+
+TEST(Mesh, CoincidentNodesAndMixedUpUnitsAreSuspicious) {
+  Mesh mesh = make_mesh(two_segments());
+  mesh.nodes.conservativeResize(3, mesh.nodes.cols() + 1);
+  const auto twin = static_cast<int>(mesh.nodes.cols()) - 1;
+  mesh.nodes.col(twin) = mesh.nodes.col(4);
+  mesh.elements[4].nodes[0] = twin;
+  ASSERT_EQ(suspicions(mesh).size(), 2U);
+  EXPECT_TRUE(suspicions(mesh)[1].starts_with("1 pairs of nodes lie at one place")) << suspicions(mesh)[1];
+
+  Mesh millimetres = make_mesh(two_segments());
+  for (BeamProperty& p : millimetres.beam_properties) p.material.rho = 2.84e-9;  // t/mm^3
+  ASSERT_FALSE(suspicions(millimetres).empty());
+  EXPECT_NE(suspicions(millimetres)[0].find("units mixed up"), std::string::npos);
 }
 
 TEST(Mesh, UnknownNodeSetListsThoseThatExist) {

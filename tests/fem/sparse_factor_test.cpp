@@ -1,5 +1,7 @@
 #include "fem/sparse_factor.hpp"
+
 #include "fem/check.hpp"
+#include "fem/constraints.hpp"
 
 #include "fem_testing.hpp"
 
@@ -13,43 +15,65 @@ using Eigen::VectorXd;
 SparseMatrix clamped_stiffness(SparseMatrix* mass = nullptr) {
   const Mesh mesh = make_mesh(uniform_boom(RoundBar{0.01}, 0.3, BeamTheory::timoshenko, 6, 4));
   const Assembly a = assemble(mesh);
-  const std::vector<int> free = free_dofs(a.dofs, node_set(mesh, "root"));
-  if (mass) *mass = submatrix(a.M, free);
-  return submatrix(a.K, free);
+  const Unknowns u = unknowns(mesh, a.dofs, node_set(mesh, "root"));
+  if (mass) *mass = u.reduced(a.M);
+  return u.reduced(a.K);
 }
 
-TEST(SparseFactor, SolvesLikeTheDenseOracle) {
+constexpr std::array kinds = {FactorKind::indefinite, FactorKind::definite};
+
+TEST(SparseFactor, SolvesBlocksLikeTheDenseOracle) {
   const SparseMatrix K = clamped_stiffness();
-  SparseFactor factor(K);
-  factor.factorise(K);
-  std::srand(3);
-  const VectorXd exact = VectorXd::Random(K.rows()), b = K * exact;
+  for (const FactorKind kind : kinds) {
+    SparseFactor factor(K, kind);
+    factor.factorise(K);
+    for (const int columns : {1, 2, 13}) {
+      std::srand(3);
+      const MatrixXd exact = MatrixXd::Random(K.rows(), columns), b = symmetric_product(K, exact);
+      MatrixXd x(K.rows(), columns);
+      factor.solve(b, x);
+      const VectorXd scale = K.diagonal().cwiseSqrt();
+      EXPECT_LT((scale.asDiagonal() * (x - exact)).norm(),
+                1e-11 * (scale.asDiagonal() * exact).norm());  // condition 1e4
+    }
+    EXPECT_EQ(factor.negative_pivots(), 0);
+    EXPECT_GE(factor.nonzeros(), K.nonZeros());
+    EXPECT_GT(factor.rcond_estimate(), 0);
+    EXPECT_GE(factor.summary().bytes, 8.0 * static_cast<double>(factor.nonzeros()));
+  }
+}
+
+TEST(SparseFactor, ADefiniteFactorRefusesWhatIsNot) {
+  SparseMatrix M;
+  const SparseMatrix K = clamped_stiffness(&M);
+  SparseFactor factor(shifted(K, 1, M), FactorKind::definite);
+  const SparseMatrix above = shifted(K, 1e9, M);
+  EXPECT_THROW(factor.factorise(above), NumericalError);
+  const SparseMatrix below = shifted(K, -1e3, M);
+  factor.factorise(below);  // and it recovers
   VectorXd x(K.rows());
-  factor.solve(b, x);
+  const VectorXd ones = VectorXd::Ones(K.rows());
+  factor.solve(symmetric_product(below, ones), x);
   const VectorXd scale = K.diagonal().cwiseSqrt();
-  EXPECT_LT((scale.asDiagonal() * (x - exact)).norm(), 1e-11 * (scale.asDiagonal() * exact).norm());  // condition 1e4
-  EXPECT_EQ(factor.negative_pivots(), 0);
-  EXPECT_GE(factor.nonzeros(), (K.nonZeros() + K.rows()) / 2);
+  EXPECT_LT((scale.asDiagonal() * (x - ones)).norm(), 1e-11 * scale.norm());
 }
 
 // Sylvester: negative pivots of K - s M are the eigenvalues below s. The same analysis serves every shift.
 TEST(SparseFactor, CountsEigenvaluesBelowAShift) {
   SparseMatrix M;
   const SparseMatrix K = clamped_stiffness(&M);
-  const SparseMatrix pattern = K + M;
-  SparseFactor factor(pattern);
+  SparseFactor factor(shifted(K, 1, M));
   const VectorXd lambda =
-      Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(MatrixXd(K), MatrixXd(M), Eigen::EigenvaluesOnly)
-          .eigenvalues();
+      Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(full(K), full(M), Eigen::EigenvaluesOnly).eigenvalues();
   for (Index below : {0, 2, 6, 20}) {
     const double shift = below == 0 ? lambda(0) / 2 : (lambda(below - 1) + lambda(below)) / 2;
-    const SparseMatrix A = K - shift * M;
+    const SparseMatrix A = shifted(K, shift, M);
     factor.factorise(A);
     EXPECT_EQ(factor.negative_pivots(), below);
     VectorXd x(A.rows());
     const VectorXd b = VectorXd::Ones(A.rows());
     factor.solve(b, x);
-    EXPECT_LT((A * x - b).norm(), 1e-8 * b.norm());  // near an eigenvalue, without pivoting
+    EXPECT_LT((symmetric_product(A, x) - b).norm(), 1e-8 * b.norm());  // near an eigenvalue, without pivoting
   }
 }
 
@@ -70,6 +94,40 @@ TEST(SparseFactor, SingularMatrixIsANumericalError) {
   VectorXd x(3);
   factor.solve(VectorXd::Ones(3), x);
   EXPECT_LT((A * x - VectorXd::Ones(3)).norm(), 4 * eps);
+}
+
+TEST(SparseFactor, NotANumberIsANumericalErrorOfEveryKind) {
+  SparseMatrix K = clamped_stiffness();
+  for (const FactorKind kind : kinds) {
+    SparseFactor factor(K, kind);
+    SparseMatrix broken = K;
+    broken.coeffRef(K.rows() / 2, K.rows() / 2) = NAN;
+    EXPECT_THROW(factor.factorise(broken), NumericalError);
+    EXPECT_EQ(input_error([&] { factor.rcond_estimate(); }), "condition: nothing is factorised");
+  }
+}
+
+// Blocks within larger ones, with gaps between their columns, and in place: the same digits as for a block alone.
+TEST(SparseFactor, SolvesBlocksWhereverTheyLie) {
+  const SparseMatrix K = clamped_stiffness();
+  const Index n = K.rows();
+  for (const FactorKind kind : kinds) {
+    SparseFactor factor(K, kind);
+    factor.factorise(K);
+    std::srand(5);
+    const MatrixXd b = MatrixXd::Random(n, 5);
+    MatrixXd alone(n, 5), large = MatrixXd::Constant(n + 3, 7, 1e3), in_place = b;
+    factor.solve(b, alone);
+    large.block(2, 1, n, 5) = b;
+    factor.solve(large.block(2, 1, n, 5), large.block(2, 1, n, 5));
+    EXPECT_EQ(large.block(2, 1, n, 5), alone);
+    large.block(2, 1, n, 5).setConstant(1e3);
+    EXPECT_EQ(large, MatrixXd::Constant(n + 3, 7, 1e3)) << "written outside the block";
+    factor.solve(in_place, in_place);
+    EXPECT_EQ(in_place, alone);
+    MatrixXd none(n, 0);
+    factor.solve(none, none);
+  }
 }
 
 TEST(SparseFactor, BadInputSaysWhatIsWrong) {
@@ -94,7 +152,7 @@ TEST(SparseFactor, Moves) {
   first.factorise(K);
   SparseFactor second = std::move(first);
   VectorXd x(K.rows());
-  second.solve(K * VectorXd::Ones(K.rows()), x);
+  second.solve(symmetric_product(K, VectorXd::Ones(K.rows())), x);
   const VectorXd scale = K.diagonal().cwiseSqrt();
   EXPECT_LT((scale.asDiagonal() * (x - VectorXd::Ones(K.rows()))).norm(), 1e-11 * scale.norm());
 }

@@ -65,6 +65,8 @@ TEST(Vtk, BadInputSaysWhatIsWrong) {
   EXPECT_EQ(fault([](VtkGrid& g) { g.points(1) = INFINITY; }), start + "points have a coordinate that is not finite");
   EXPECT_EQ(fault([](VtkGrid& g) { g.cells[1].points[0] = 5; }), start + "cell 1: point 5 is missing");
   EXPECT_EQ(fault([](VtkGrid& g) { g.cells[1].points.clear(); }), start + "cell 1 has no points");
+  EXPECT_EQ(fault([](VtkGrid& g) { g.point_groups = {{"tip", {5}}}; }), start + "point group \"tip\": 5 is missing");
+  EXPECT_EQ(fault([](VtkGrid& g) { g.cell_groups = {{"end", {4}}}; }), start + "cell group \"end\": 4 is missing");
   EXPECT_EQ(fault([](VtkGrid& g) { g.cells[0].type = 0; }), start + "cell 0 has type 0, which VTK does not have");
   EXPECT_FALSE(std::filesystem::exists(folder.path / "x.vtu"));
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "fem/assembly.hpp"
+#include "fem/boom.hpp"
 
 namespace flexboom::test {
 

@@ -1,94 +1,19 @@
 #include "reduction/eigen_solver.hpp"
 
-#include "fem/check.hpp"
-#include "reduction/eigen_backends.hpp"
+#include "tests/reduction/eigen_testing.hpp"
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <functional>
-#include <numbers>
 #include <string>
 #include <vector>
 
-namespace flexboom {
+namespace flexboom::test {
 namespace {
-
-constexpr double pi = std::numbers::pi;
-
-struct System {
-  SparseMatrix K;
-  SparseMatrix M;
-  EigenProblem problem(bool free_floating = false) const { return {K, M, free_floating}; }
-};
-
-System from_triplets(int n, const std::vector<Eigen::Triplet<double>>& K, const Eigen::VectorXd& mass) {
-  System s{SparseMatrix(n, n), SparseMatrix(n, n)};
-  s.K.setFromTriplets(K.begin(), K.end());
-  std::vector<Eigen::Triplet<double>> M;
-  for (int i = 0; i < n; ++i) M.emplace_back(i, i, mass(i));
-  s.M.setFromTriplets(M.begin(), M.end());
-  return s;
-}
-
-/// `copies` separate strings of n unit masses and unit springs between fixed walls: omega_j^2 = 4 sin^2(j pi / (2n +
-/// 2)), each `copies` times. Ends free when `free`: omega_j^2 = 4 sin^2(j pi / 2n), j = 0, 1, ...
-System strings(int n, int copies = 1, bool free = false) {
-  std::vector<Eigen::Triplet<double>> K;
-  for (int c = 0; c < copies; ++c) {
-    for (int i = 0; i < n; ++i) {
-      const int row = c * n + i;
-      const bool end = i == 0 || i == n - 1;
-      K.emplace_back(row, row, free && end ? 1 : 2);
-      if (i + 1 < n) {
-        K.emplace_back(row, row + 1, -1);
-        K.emplace_back(row + 1, row, -1);
-      }
-    }
-  }
-  return from_triplets(n * copies, K, Eigen::VectorXd::Ones(n * copies));
-}
-
-double string_frequency(int n, int j) { return 4 * std::pow(std::sin(j * pi / (2 * n + 2)), 2); }
-
-/// Square membrane on an n x n grid: the eigenvalues are sums of two of the string's, every pair (i, j), (j, i) twice.
-System membrane(int n) {
-  std::vector<Eigen::Triplet<double>> K;
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) {
-      const int row = i * n + j;
-      K.emplace_back(row, row, 4);
-      for (const int neighbour :
-           {i > 0 ? row - n : -1, i < n - 1 ? row + n : -1, j > 0 ? row - 1 : -1, j < n - 1 ? row + 1 : -1}) {
-        if (neighbour >= 0) K.emplace_back(row, neighbour, -1);
-      }
-    }
-  }
-  return from_triplets(n * n, K, Eigen::VectorXd::Ones(n * n));
-}
-
-std::vector<double> membrane_frequencies(int n) {
-  std::vector<double> all;
-  for (int i = 1; i <= n; ++i) {
-    for (int j = 1; j <= n; ++j) all.push_back(string_frequency(n, i) + string_frequency(n, j));
-  }
-  std::ranges::sort(all);
-  return all;
-}
-
-EigenOptions options(int modes, const std::string& backend) {
-  return {.num_modes = modes, .sigma = {}, .backend = backend};
-}
 
 /// Every row of the table takes every one of these tests.
 class EveryBackend : public testing::TestWithParam<std::string> {};
 
-std::vector<std::string> backend_names() {
-  std::vector<std::string> names;
-  for (const EigenBackend& row : eigen_backends()) names.emplace_back(row.name);
-  return names;
-}
 INSTANTIATE_TEST_SUITE_P(Table, EveryBackend, testing::ValuesIn(backend_names()),
                          [](const auto& row) { return row.param; });
 
@@ -240,15 +165,6 @@ TEST_P(EveryBackend, KeepsTheLowFrequenciesOfAStiffBody) {
   for (int j = 0; j < 4; ++j) EXPECT_NEAR(pairs.lambda(j), 0.5 * string_frequency(100, j + 1), 4e-6) << j;
 }
 
-std::string message(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
-}
-
 TEST(EigenSolver, BadRequestsAreRefusedWithAReason) {
   const System s = strings(10);
   EXPECT_NE(message([&] { solve_modes(s.problem(), options(11, "arpack")); }).find("10 unknowns"), std::string::npos);
@@ -261,10 +177,12 @@ TEST(EigenSolver, BadRequestsAreRefusedWithAReason) {
 }
 
 // Backends that lie, each in one way.
-EigenPairs one_mode_missed(const EigenProblem& p, const SparseFactor& f, double sigma, int count, double tolerance) {
-  EigenPairs pairs = dense_modes(p, f, sigma, count + 1, tolerance);
+EigenPairs one_mode_missed(const EigenProblem& p, const SparseFactor& f, const EigenRequest& request) {
+  EigenRequest more = request;
+  ++more.count;
+  EigenPairs pairs = dense_modes(p, f, more);
   std::vector<int> kept;
-  for (int i = 0; i <= count; ++i) {
+  for (int i = 0; i < more.count; ++i) {
     if (i != 2) kept.push_back(i);  // the second of the first pair
   }
   pairs.lambda = pairs.lambda(kept).eval();
@@ -272,22 +190,22 @@ EigenPairs one_mode_missed(const EigenProblem& p, const SparseFactor& f, double 
   return pairs;
 }
 
-EigenPairs one_mode_twice(const EigenProblem& p, const SparseFactor& f, double sigma, int count, double tolerance) {
-  EigenPairs pairs = dense_modes(p, f, sigma, count, tolerance);
+EigenPairs one_mode_twice(const EigenProblem& p, const SparseFactor& f, const EigenRequest& request) {
+  EigenPairs pairs = dense_modes(p, f, request);
   pairs.Phi.col(2) = pairs.Phi.col(1);
   return pairs;
 }
 
-EigenPairs wrong_values(const EigenProblem& p, const SparseFactor& f, double sigma, int count, double tolerance) {
-  EigenPairs pairs = dense_modes(p, f, sigma, count, tolerance);
+EigenPairs wrong_values(const EigenProblem& p, const SparseFactor& f, const EigenRequest& request) {
+  EigenPairs pairs = dense_modes(p, f, request);
   pairs.lambda *= 1 + 1e-5;
   return pairs;
 }
 
-std::string refusal(const EigenBackend& backend) {
+std::string refusal(const EigenBackend& backend, SturmPolicy sturm = SturmPolicy::always) {
   const System s = membrane(15);
   try {
-    solve_modes_with(backend, s.problem(), {.num_modes = 6, .sigma = {}, .backend = ""});
+    solve_modes_with(backend, s.problem(), {.num_modes = 6, .sigma = {}, .backend = "", .sturm = sturm});
   } catch (const NumericalError& e) {
     return e.what();
   }
@@ -299,11 +217,14 @@ TEST(EigenSolver, WrongAnswersOfABackendAreRefused) {
   EXPECT_NE(refusal({"liar", one_mode_twice}).find("not M-orthonormal"), std::string::npos);
   EXPECT_NE(refusal({"liar", wrong_values}).find("residual"), std::string::npos);
   EXPECT_EQ(refusal({"honest", dense_modes}), "accepted");
+  // Without the count, random vectors find the mode that is missing.
+  EXPECT_NE(refusal({"liar", one_mode_missed}, SturmPolicy::never).find("search from random"), std::string::npos);
+  EXPECT_EQ(refusal({"honest", dense_modes}, SturmPolicy::never), "accepted");
 }
 
 TEST(EigenSolver, TableHasTheBackendsPromised) {
-  EXPECT_EQ(backend_names(), (std::vector<std::string>{"arpack", "spectra", "dense"}));
+  EXPECT_EQ(backend_names(), (std::vector<std::string>{"arpack", "block", "spectra", "dense"}));
 }
 
 }  // namespace
-}  // namespace flexboom
+}  // namespace flexboom::test

@@ -141,7 +141,7 @@ TEST(Reduce, TurningTheBodyTurnsItsInvariants) {
   ModalBasis basis = r.basis;
   for (int node = 0; node < mesh.nodes.cols(); ++node) {
     for (const int half : {0, 3}) {
-      auto rows = basis.Phi.middleRows<3>(DofMap::of_node(node, half));
+      auto rows = basis.Phi.middleRows<3>(assembly.dofs.of_node(node, half));
       rows = (A * rows).eval();
     }
   }

@@ -1,7 +1,7 @@
 // Walks through every installed library once: a boom as beams, its modes, its reduced body, and a short flight on a
 // hub.
 #include <dynamics/integrator.hpp>
-#include <fem/assembly.hpp>
+#include <fem/boom.hpp>
 #include <reduction/eq14.hpp>
 #include <reduction/inertia_invariants.hpp>
 

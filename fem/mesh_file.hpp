@@ -1,0 +1,41 @@
+#pragma once
+
+#include "fem/mesh.hpp"
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace flexboom {
+
+/// What a mesh file holds beside the mesh.
+struct MeshFile {
+  Mesh mesh;                 // not validated: a material may still be missing
+  std::optional<int> modes;  // number of frequencies that the file asks for (a deck with a *FREQUENCY step, EIGRL)
+  std::vector<std::string> notes;  // what was read as something else or left out without effect on the modes
+};
+
+/// A format: how it is recognised and what reads and writes it. A null pointer where it cannot.
+struct MeshFormat {
+  std::string_view name;
+  std::span<const std::string_view> extensions;  // ".inp", ...
+  MeshFile (*read)(const std::filesystem::path&);
+  void (*write)(const std::filesystem::path&, const Mesh&);
+};
+
+/// The table of formats: Gmsh, CalculiX/Abaqus, Nastran, VTK, and what the program gmsh reads (STEP, BREP, .geo).
+std::span<const MeshFormat> mesh_formats();
+
+/// Reads a mesh, the format being told by the extension. Nodes that no element uses are kept only where a connection,
+/// mass or set needs them.
+/// @throws InputError with file:line (byte offset in binary files), what was wrong, and what would be right.
+MeshFile read_mesh(const std::filesystem::path&);
+
+/// Writes a mesh with its sets, the format being told by the extension.
+/// @throws InputError when the format cannot hold the mesh (saying which element or connection) or the disk refuses.
+void write_mesh(const std::filesystem::path&, const Mesh&);
+
+}  // namespace flexboom

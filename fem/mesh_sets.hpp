@@ -1,0 +1,24 @@
+#pragma once
+
+#include "fem/mesh_file.hpp"
+
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// Ascending, each once.
+std::vector<int> sorted_unique(std::vector<int>);
+
+/// Leaves out of the mesh every node that no element, body, support, connection or equation uses, also from node sets;
+/// sets that are then empty go as well. Notes say how many.
+void drop_unused_nodes(MeshFile&);
+
+/// Labels for a file: those of the mesh if there are `count`, positive and different, else 1, 2, 3, ...
+std::vector<long> file_labels(const std::vector<long>& labels, size_t count);
+
+/// Exchanges the two triangles of wedges that are inside out because their file counts them the other way round (VTK
+/// and others disagree). Returns their number.
+int turn_wedges(Mesh&);
+
+}  // namespace flexboom

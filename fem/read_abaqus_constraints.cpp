@@ -1,0 +1,227 @@
+#include "fem/read_abaqus_deck.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+
+#include <array>
+
+// Supports and connections.
+namespace flexboom::abaqus {
+namespace {
+
+using Eigen::Vector3d;
+using Fields = std::vector<std::string_view>;
+
+constexpr int temperature_freedom = 11;
+
+struct NamedSupport {
+  std::string_view name, components;
+};
+constexpr std::array<NamedSupport, 8> named_supports{{
+    {"ENCASTRE", "123456"},
+    {"PINNED", "123"},
+    {"XSYMM", "156"},
+    {"YSYMM", "246"},
+    {"ZSYMM", "345"},
+    {"XASYMM", "234"},
+    {"YASYMM", "135"},
+    {"ZASYMM", "126"},
+}};
+
+bool named_support(Deck& deck, const Fields& fields) {
+  if (fields.size() < 2) return false;
+  const std::string name = upper_key(fields[1]);
+  for (const NamedSupport& support : named_supports) {
+    if (support.name != name) continue;
+    for (const char digit : support.components) {
+      const int component = digit - '0';
+      deck.boundaries.push_back({deck.reference(unquoted(fields[0])), component, component, fields[0]});
+    }
+    return true;
+  }
+  return false;
+}
+
+/// Lines "first, last" of degrees of freedom. @returns false if there was none.
+bool read_components(Deck& deck, Components& components, int highest) {
+  bool any = false;
+  while (const Fields* fields = deck.lines.next_data()) {
+    const auto first = deck.lines.text().integer((*fields)[0], "degree of freedom", 1, highest);
+    const bool range = fields->size() > 1 && !(*fields)[1].empty();
+    const auto last = range ? deck.lines.text().integer((*fields)[1], "last degree of freedom", first, highest) : first;
+    if (!any) components = {};
+    for (long k = first; k <= last; ++k) components[static_cast<size_t>(k - 1)] = true;
+    any = true;
+  }
+  return any;
+}
+
+Components translations() { return {true, true, true, false, false, false}; }
+
+}  // namespace
+
+void read_boundary(Deck& deck, const Keyword& keyword) {
+  deck.lines.allow(keyword, {"OP", "TYPE", "AMPLITUDE", "FIXED", "LOADCASE", "TIMEDELAY"});
+  const std::string type = upper_key(keyword.find("TYPE").value_or("DISPLACEMENT"));
+  if (type != "DISPLACEMENT") deck.fail(keyword.at, "*BOUNDARY is understood with TYPE=DISPLACEMENT only");
+  if (upper_key(keyword.find("OP").value_or("MOD")) == "NEW" && deck.in_step && !deck.cleared) {
+    deck.boundaries.clear();
+    deck.cleared = true;
+  }
+  while (const Fields* fields = deck.lines.next_data()) {
+    if (named_support(deck, *fields)) continue;
+    if (fields->size() < 2) deck.fail(deck.lines.line(), "*BOUNDARY needs a node or set and a degree of freedom");
+    const DeckText& text = deck.lines.text();
+    const long first = text.integer((*fields)[1], "degree of freedom");
+    const bool range = fields->size() > 2 && !(*fields)[2].empty();
+    const long last = range ? text.integer((*fields)[2], "last degree of freedom") : first;
+    if (first == temperature_freedom && last == first) {
+      deck.notes.add("temperatures have no effect on the modes");
+      continue;
+    }
+    if (first < 1 || last > 6 || last < first)
+      deck.fail((*fields)[1], fmt::format("degrees of freedom {} to {} must lie in 1 to 6", first, last));
+    if (deck.real_or_zero(*fields, 3, "prescribed value") != 0)
+      deck.notes.add("prescribed displacements other than zero are held at zero in the modes");
+    deck.boundaries.push_back(
+        {deck.reference(unquoted((*fields)[0])), static_cast<int>(first), static_cast<int>(last), (*fields)[0]});
+  }
+}
+
+void read_rigid_body(Deck& deck, const Keyword& keyword) {
+  deck.lines.allow(keyword, {"NSET", "ELSET", "REFNODE", "ROTNODE", "PINNSET", "TIENSET", "POSITION", "ISOTHERMAL"});
+  if (upper_key(keyword.find("POSITION").value_or("INPUT")) != "INPUT")
+    deck.fail(keyword.at, "*RIGID BODY, POSITION=CENTER OF MASS is not understood; give the reference node its place");
+  Rigid rigid;
+  rigid.reference = deck.reference(deck.lines.need(keyword, "REFNODE"));
+  if (const auto rotation = keyword.find("ROTNODE")) rigid.rotation = deck.reference(*rotation);
+  rigid.at = keyword.at;
+  const size_t before = deck.rigids.size();
+  const auto add = [&](std::string_view parameter, Reference Rigid::*where, const Components& components) {
+    const auto name = keyword.find(parameter);
+    if (!name) return;
+    Rigid& copy = deck.rigids.emplace_back(rigid);
+    copy.*where = deck.reference(*name);
+    copy.components = components;
+  };
+  add("NSET", &Rigid::nodes, all_components);
+  add("TIENSET", &Rigid::nodes, all_components);
+  add("PINNSET", &Rigid::nodes, translations());
+  add("ELSET", &Rigid::elements, all_components);
+  if (deck.rigids.size() == before) deck.fail(keyword.at, "*RIGID BODY needs NSET or ELSET");
+}
+
+void read_coupling(Deck& deck, const Keyword& keyword) {
+  deck.lines.allow(keyword, {"REFNODE", "SURFACE", "CONSTRAINTNAME", "ORIENTATION"});
+  Rigid coupling;
+  coupling.reference = deck.reference(deck.lines.need(keyword, "REFNODE"));
+  coupling.surface = deck.reference(deck.lines.need(keyword, "SURFACE"));
+  coupling.at = keyword.at;
+  const auto kind = deck.lines.next_keyword();
+  if (!kind || (kind->name != "KINEMATIC" && kind->name != "DISTRIBUTING"))
+    deck.fail(kind ? kind->at : keyword.at, "*COUPLING must be followed by *KINEMATIC or *DISTRIBUTING");
+  coupling.distributing = kind->name == "DISTRIBUTING";
+  const bool turned = keyword.has("ORIENTATION");
+  if (coupling.distributing) {
+    deck.lines.allow(*kind, {"COUPLING", "WEIGHTINGMETHOD"});
+    if (upper_key(kind->find("WEIGHTINGMETHOD").value_or("UNIFORM")) != "UNIFORM")
+      deck.fail(kind->at, "*DISTRIBUTING is understood with WEIGHTING METHOD=UNIFORM only");
+    deck.notes.add("*DISTRIBUTING makes the reference node follow the surface (as RBE3), with a mass on it as well");
+  } else {
+    deck.lines.allow(*kind, {});
+  }
+  const bool listed = read_components(deck, coupling.components, 6);
+  if (coupling.distributing) {
+    // Translations always follow, and rotations together or not at all.
+    const Components& c = coupling.components;
+    if (turned && listed && (c[3] || c[4] || c[5]) && !(c[3] && c[4] && c[5]))
+      deck.fail(keyword.at, "*COUPLING with ORIENTATION must take all rotations or none");
+    coupling.components[0] = coupling.components[1] = coupling.components[2] = true;
+  } else {
+    const Components& c = coupling.components;
+    if (turned && !(c[0] && c[1] && c[2]))
+      deck.fail(keyword.at, "*COUPLING with ORIENTATION is understood if it takes degrees of freedom 1 to 3");
+  }
+  deck.rigids.push_back(std::move(coupling));
+}
+
+void read_distributing_coupling(Deck& deck, const Keyword& keyword) {
+  deck.lines.allow(keyword, {"ELSET"});
+  DistributingElements coupling{deck.reference(deck.lines.need(keyword, "ELSET")), {}, keyword.at};
+  while (const Fields* fields = deck.lines.next_data()) {
+    const double weight = fields->size() > 1 ? deck.real((*fields)[1], "weight") : 1;
+    if (weight <= 0) deck.fail((*fields)[1], "a weight must be positive");
+    coupling.weights.emplace_back(deck.reference(unquoted((*fields)[0])), weight);
+  }
+  if (coupling.weights.empty()) deck.fail(keyword.at, "*DISTRIBUTING COUPLING: the nodes are missing");
+  deck.distributing.push_back(std::move(coupling));
+}
+
+void read_equation(Deck& deck, const Keyword& keyword) {
+  deck.lines.allow(keyword, {});
+  while (const Fields* header = deck.lines.next_data()) {
+    const std::string_view at = (*header)[0];
+    const long count = deck.lines.text().integer(at, "number of terms", 1, 1'000'000);
+    Equation equation;
+    equation.at = at;
+    while (std::ssize(equation.terms) < count) {
+      const Fields* fields = deck.lines.next_data();
+      if (fields == nullptr)
+        deck.fail(at, fmt::format("the equation ends after {} of {} terms", equation.terms.size(), count));
+      if (fields->size() % 3 != 0)
+        deck.fail(deck.lines.line(), "an equation has three fields per term: node, degree of freedom, coefficient");
+      for (size_t i = 0; i < fields->size(); i += 3) {
+        const long component = deck.lines.text().integer((*fields)[i + 1], "degree of freedom", 1, 6);
+        equation.terms.push_back({deck.reference(unquoted((*fields)[i])), static_cast<int>(component),
+                                  deck.real((*fields)[i + 2], "coefficient")});
+      }
+    }
+    if (std::ssize(equation.terms) > count)
+      deck.fail(at, fmt::format("{} terms follow where {} were announced", equation.terms.size(), count));
+    deck.equations.push_back(std::move(equation));
+  }
+}
+
+void read_mpc(Deck& deck, const Keyword& keyword) {
+  deck.lines.allow(keyword, {});
+  while (const Fields* fields = deck.lines.next_data()) {
+    const std::string type = upper_key((*fields)[0]);
+    if (type != "BEAM" && type != "TIE" && type != "PIN" && type != "LINK")
+      deck.fail((*fields)[0],
+                fmt::format("*MPC {} is not understood; there are BEAM, TIE, PIN, LINK", quoted((*fields)[0])));
+    if (fields->size() != 3) deck.fail(deck.lines.line(), fmt::format("*MPC {} needs two nodes or sets", type));
+    deck.mpcs.push_back(
+        {type, deck.reference(unquoted((*fields)[1])), deck.reference(unquoted((*fields)[2])), (*fields)[0]});
+  }
+}
+
+void read_tie(Deck& deck, const Keyword& keyword) {
+  deck.lines.allow(keyword, {"NAME", "POSITIONTOLERANCE", "ADJUST", "TYPE", "NOROTATION", "CONSTRAINTRATIO"});
+  std::optional<double> tolerance;
+  if (const auto value = keyword.find("POSITIONTOLERANCE")) tolerance = deck.real(*value, "POSITION TOLERANCE");
+  const bool adjust = upper_key(keyword.find("ADJUST").value_or("YES")) != "NO";
+  while (const Fields* fields = deck.lines.next_data()) {
+    if (fields->size() < 2) deck.fail(deck.lines.line(), "*TIE needs a slave and a master surface");
+    deck.ties.push_back({deck.reference(unquoted((*fields)[0])), deck.reference(unquoted((*fields)[1])), tolerance,
+                         adjust, (*fields)[0]});
+  }
+}
+
+void read_transform(Deck& deck, const Keyword& keyword) {
+  deck.lines.allow(keyword, {"NSET", "TYPE"});
+  const std::string type = upper_key(keyword.find("TYPE").value_or("R"));
+  if (type != "R" && type != "C") deck.fail(keyword.at, "*TRANSFORM is understood with TYPE=R or C");
+  const Fields* fields = deck.lines.next_data();
+  if (fields == nullptr || fields->size() < 6) deck.fail(keyword.at, "*TRANSFORM needs six coordinates of two points");
+  Vector3d a, b;
+  for (size_t k = 0; k < 3; ++k) {
+    a(static_cast<int>(k)) = deck.real_or_zero(*fields, k, "coordinate");
+    b(static_cast<int>(k)) = deck.real_or_zero(*fields, k + 3, "coordinate");
+  }
+  const bool flat = type == "C" ? (b - a).norm() == 0 : a.cross(b).norm() <= 1e-10 * a.norm() * b.norm();
+  if (flat) deck.fail((*fields)[0], "the two points of *TRANSFORM define no axes");
+  deck.transforms.push_back({deck.reference(deck.lines.need(keyword, "NSET")), type == "C", a, b, keyword.at});
+}
+
+}  // namespace flexboom::abaqus

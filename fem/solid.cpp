@@ -1,0 +1,299 @@
+#include "fem/solid.hpp"
+
+#include "fem/elasticity.hpp"
+#include "fem/shape_functions.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/LU>
+
+#include <array>
+#include <cmath>
+#include <string>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::Matrix3Xd;
+using Eigen::MatrixX3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using elasticity::Lame;
+
+// What a kind is made of. Rules are those of CalculiX (C3D20, C3D20R, C3D10, C3D15, C3D8I), whose frequencies on one
+// mesh are then ours, as long as they leave every element its exact mass, centre and inertia where its map is affine.
+// The one mass point of C3D4 and the two of C3D6 lose the element's own inertia: here they have more.
+struct Recipe {
+  Index nodes;
+  ShapeFunctions (*shapes)(const Vector3d&);
+  const Matrix3Xd& (*positions)();
+  PointRule (*stiffness_rule)();
+  PointRule (*mass_rule)(int extra);
+};
+
+template <int n>
+PointRule cube() {
+  return hexahedron_rule(n);
+}
+template <int n>
+PointRule finer_cube(int extra) {
+  return hexahedron_rule(n + extra);
+}
+template <int points>
+PointRule tetrahedron() {
+  return tetrahedron_rule(points);
+}
+PointRule finer_tetrahedron(int extra) {
+  return extra == 0 ? tetrahedron_rule(4) : collapsed_tetrahedron_rule(3 + extra);
+}
+template <int triangle, int n>
+PointRule wedge() {
+  return wedge_rule(triangle, n);
+}
+template <int triangle>
+PointRule finer_wedge(int extra) {
+  return extra == 0 ? wedge_rule(triangle, 3) : collapsed_wedge_rule(3 + extra);
+}
+
+// Reduced points alone leave motions without stiffness: six of a lone C3D20R, one or more of a row of them, one of a
+// lone C3D6. A share of the full rule gives them some; other frequencies rise by a fraction of that share.
+PointRule stabilised(const PointRule& reduced, const PointRule& full) {
+  constexpr double share = 1e-5;
+  PointRule rule{Matrix3Xd(3, reduced.points.cols() + full.points.cols()),
+                 VectorXd(reduced.weights.size() + full.weights.size())};
+  rule.points << reduced.points, full.points;
+  rule.weights << (1 - share) * reduced.weights, share * full.weights;
+  return rule;
+}
+PointRule stabilised_cube() { return stabilised(hexahedron_rule(2), hexahedron_rule(3)); }
+PointRule stabilised_wedge() { return stabilised(wedge_rule(1, 2), wedge_rule(3, 2)); }
+
+constexpr std::array<Recipe, 8> recipes = {{{8, hex8_shapes, hexahedron_nodes, cube<2>, finer_cube<2>},
+                                            {20, hex20_shapes, hexahedron_nodes, cube<3>, finer_cube<3>},
+                                            {20, hex20_shapes, hexahedron_nodes, stabilised_cube, finer_cube<2>},
+                                            {27, hex27_shapes, hexahedron_nodes, cube<3>, finer_cube<4>},
+                                            {4, tet4_shapes, tetrahedron_nodes, tetrahedron<1>, finer_tetrahedron},
+                                            {10, tet10_shapes, tetrahedron_nodes, tetrahedron<4>, finer_tetrahedron},
+                                            {6, wedge6_shapes, wedge_nodes, stabilised_wedge, finer_wedge<6>},
+                                            {15, wedge15_shapes, wedge_nodes, wedge<3, 3>, finer_wedge<3>}}};
+
+template <SolidKind kind>
+constexpr const Recipe& recipe = recipes[static_cast<size_t>(kind)];
+
+// Shape functions at the Q points of a rule.
+struct Table {
+  VectorXd weights;
+  MatrixXd values;  // n x Q
+  MatrixXd slopes;  // n x 3 Q: by reference coordinate
+  MatrixXd rows;    // its transpose
+};
+
+Table make_table(const Recipe& recipe, const PointRule& rule) {
+  const Index count = rule.weights.size();
+  Table table{rule.weights, MatrixXd(recipe.nodes, count), MatrixXd(recipe.nodes, 3 * count), {}};
+  for (Index q = 0; q < count; ++q) {
+    const ShapeFunctions shapes = recipe.shapes(rule.points.col(q));
+    table.values.col(q) = shapes.values;
+    table.slopes.middleCols<3>(3 * q) = shapes.gradients;
+  }
+  table.rows = table.slopes.transpose();
+  return table;
+}
+
+template <SolidKind kind>
+const Table& stiffness_table() {
+  static const Table table = make_table(recipe<kind>, recipe<kind>.stiffness_rule());
+  return table;
+}
+
+template <SolidKind kind>
+const Table& mass_table() {
+  static const Table table = make_table(recipe<kind>, recipe<kind>.mass_rule(0));
+  return table;
+}
+
+// Where validate looks: points of both rules, then the nodes.
+template <SolidKind kind>
+const Table& check_table() {
+  static const Table table = [] {
+    const PointRule stiffness = recipe<kind>.stiffness_rule();
+    const Index points = stiffness.weights.size(), nodes = recipe<kind>.nodes;
+    PointRule rule{Matrix3Xd(3, points + nodes), VectorXd::Zero(points + nodes)};
+    rule.points << stiffness.points, recipe<kind>.positions().leftCols(nodes);
+    return make_table(recipe<kind>, rule);
+  }();
+  return table;
+}
+
+// Slopes of the position at every point (3 Q x 3): row 3 q + r, column c: d x_c / d xi_r.
+MatrixX3d jacobians(const Table& table, const MatrixX3d& X) {
+  MatrixX3d J(table.rows.rows(), 3);
+  for (Index c = 0; c < 3; ++c)
+    J.col(c).noalias() = table.rows * X.col(c);  // three columns do not repay a blocked product
+  return J;
+}
+
+// Volume of each point [m^3].
+VectorXd volumes(const Table& table, const MatrixX3d& X) {
+  const MatrixX3d J = jacobians(table, X);
+  VectorXd volumes(table.weights.size());
+  for (Index q = 0; q < volumes.size(); ++q)
+    volumes(q) = table.weights(q) * Matrix3d(J.middleRows<3>(3 * q)).determinant();
+  return volumes;
+}
+
+// Gradients by position at every point: column q holds those of all nodes, x then y then z (3 n), times sqrt(volume)
+// when `scaled`.
+struct Gradients {
+  MatrixXd columns;
+  VectorXd volumes;
+};
+
+Gradients gradients(const Table& table, const MatrixX3d& X, bool scaled) {
+  const Index n = X.rows(), count = table.weights.size();
+  const MatrixX3d J = jacobians(table, X);
+  Gradients g{MatrixXd(3 * n, count), VectorXd(count)};
+  for (Index q = 0; q < count; ++q) {
+    const Matrix3d Jt = J.middleRows<3>(3 * q);
+    g.volumes(q) = table.weights(q) * Jt.determinant();
+    const double scale = scaled ? std::sqrt(g.volumes(q)) : 1;
+    const Matrix3d inverse = scale * Jt.inverse().transpose();  // (r, i): d xi_r / d x_i
+    Eigen::Map<MatrixX3d>(g.columns.col(q).data(), n, 3).noalias() =
+        table.slopes.middleCols<3>(3 * q).lazyProduct(inverse);
+  }
+  return g;
+}
+
+MatrixXd stiffness_of(const Table& table, const Mesh& mesh, const Element& element) {
+  const Gradients g = gradients(table, elasticity::local_positions(mesh, element), true);
+  MatrixXd H = MatrixXd::Zero(g.columns.rows(), g.columns.rows());
+  H.selfadjointView<Eigen::Lower>().rankUpdate(g.columns);
+  return elasticity::stiffness_from_gradients(H, elasticity::lame(elasticity::material_of(mesh, element)));
+}
+
+MatrixXd mass_of(const Table& table, const Mesh& mesh, const Element& element) {
+  const double rho = elasticity::material_of(mesh, element).rho;
+  const VectorXd dm = rho * volumes(table, elasticity::local_positions(mesh, element));
+  const MatrixXd scaled = table.values * dm.cwiseSqrt().asDiagonal();
+  MatrixXd m = MatrixXd::Zero(scaled.rows(), scaled.rows());
+  m.selfadjointView<Eigen::Lower>().rankUpdate(scaled);
+  return elasticity::mass_from_scalar(m);
+}
+
+VectorXd energy_of(const Table& table, const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
+  const MatrixX3d X = elasticity::local_positions(mesh, element);
+  const Lame lame = elasticity::lame(elasticity::material_of(mesh, element));
+  const MatrixX3d J = jacobians(table, X);
+  // Column 3 k + i: component i of vector k, less its value at the first node, which strains nothing.
+  MatrixXd U(X.rows(), 3 * q.cols());
+  for (Index k = 0; k < q.cols(); ++k) {
+    for (Index a = 0; a < X.rows(); ++a) {
+      U.block<1, 3>(a, 3 * k) = (q.col(k).segment<3>(3 * a) - q.col(k).head<3>()).transpose();
+    }
+  }
+  const MatrixXd R = table.rows * U;
+  VectorXd energy = VectorXd::Zero(q.cols());
+  for (Index p = 0; p < table.weights.size(); ++p) {
+    const Matrix3d Jt = J.middleRows<3>(3 * p), inverse = Jt.inverse();
+    const double volume = table.weights(p) * Jt.determinant();
+    for (Index k = 0; k < q.cols(); ++k) {
+      const Matrix3d gradient = inverse * R.block<3, 3>(3 * p, 3 * k);
+      energy(k) += volume * elasticity::energy_density(gradient, lame);
+    }
+  }
+  return energy;
+}
+
+void visit_masses(const Table& table, const Mesh& mesh, const Element& element, const MassPointVisitor& visit) {
+  const MatrixX3d X = elasticity::local_positions(mesh, element);
+  const Vector3d first = mesh.nodes.col(element.nodes[0]);
+  const VectorXd dm = elasticity::material_of(mesh, element).rho * volumes(table, X);
+  elasticity::MassPoint point(X.rows());
+  for (Index q = 0; q < dm.size(); ++q) {
+    point.visit(dm(q), first + X.transpose() * table.values.col(q), table.values.col(q), visit);
+  }
+}
+
+void visit_strains(const Table& table, const Mesh& mesh, const Element& element, const StrainPointVisitor& visit) {
+  const MatrixXd D = elasticity::elasticity_matrix(elasticity::lame(elasticity::material_of(mesh, element)));
+  const Gradients g = gradients(table, elasticity::local_positions(mesh, element), false);
+  const Index n = g.columns.rows() / 3;
+  for (Index q = 0; q < g.volumes.size(); ++q) {
+    visit(g.volumes(q), elasticity::strain_rows(Eigen::Map<const MatrixX3d>(g.columns.col(q).data(), n, 3)), D);
+  }
+}
+
+void require_upright(const Table& table, const Mesh& mesh, const Element& element) {
+  const MatrixX3d J = jacobians(table, elasticity::local_positions(mesh, element));
+  const Index points = table.weights.size() - std::ssize(element.nodes);
+  for (Index q = 0; q < table.weights.size(); ++q) {
+    const Matrix3d slopes = J.middleRows<3>(3 * q).transpose();
+    const double determinant = slopes.determinant();
+    if (elasticity::is_valid(slopes, determinant)) continue;
+    const std::string place =
+        q < points ? fmt::format("integration point {}", q + 1)
+                   : fmt::format("node {}", mesh.node_label(element.nodes[static_cast<size_t>(q - points)]));
+    elasticity::throw_inverted(determinant, place);
+  }
+}
+
+}  // namespace
+
+template <SolidKind kind>
+MatrixXd Solid<kind>::stiffness(const Mesh& mesh, const Element& element) {
+  return stiffness_of(stiffness_table<kind>(), mesh, element);
+}
+
+template <SolidKind kind>
+MatrixXd Solid<kind>::mass(const Mesh& mesh, const Element& element) {
+  return mass_of(mass_table<kind>(), mesh, element);
+}
+
+template <SolidKind kind>
+void Solid<kind>::mass_points(const Mesh& mesh, const Element& element, int extra, const MassPointVisitor& visit) {
+  if (extra == 0) return visit_masses(mass_table<kind>(), mesh, element, visit);
+  visit_masses(make_table(recipe<kind>, recipe<kind>.mass_rule(extra)), mesh, element, visit);
+}
+
+template <SolidKind kind>
+void Solid<kind>::strain_points(const Mesh& mesh, const Element& element, const StrainPointVisitor& visit) {
+  visit_strains(stiffness_table<kind>(), mesh, element, visit);
+}
+
+template <SolidKind kind>
+Eigen::Matrix<double, 6, Eigen::Dynamic> Solid<kind>::interpolation(const Mesh& mesh, const Element& element,
+                                                                    const Vector3d& at) {
+  const ShapeFunctions shapes = recipe<kind>.shapes(at);
+  const Matrix3d J = elasticity::local_positions(mesh, element).transpose() * shapes.gradients;
+  return elasticity::motion_rows(shapes.values, shapes.gradients * J.inverse());
+}
+
+template <SolidKind kind>
+Vector3d Solid<kind>::position(const Mesh& mesh, const Element& element, const Vector3d& at) {
+  const Vector3d first = mesh.nodes.col(element.nodes[0]);
+  return first + elasticity::local_positions(mesh, element).transpose() * recipe<kind>.shapes(at).values;
+}
+
+template <SolidKind kind>
+VectorXd Solid<kind>::strain_energy(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
+  return energy_of(stiffness_table<kind>(), mesh, element, q);
+}
+
+template <SolidKind kind>
+void Solid<kind>::validate(const Mesh& mesh, const Element& element) {
+  elasticity::require_property(mesh, element);
+  require_upright(check_table<kind>(), mesh, element);
+}
+
+template struct Solid<SolidKind::hex8>;
+template struct Solid<SolidKind::hex20>;
+template struct Solid<SolidKind::hex20_reduced>;
+template struct Solid<SolidKind::hex27>;
+template struct Solid<SolidKind::tet4>;
+template struct Solid<SolidKind::tet10>;
+template struct Solid<SolidKind::wedge6>;
+template struct Solid<SolidKind::wedge15>;
+
+}  // namespace flexboom

@@ -1,0 +1,107 @@
+#include "reduction/eigen_basis.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+
+namespace flexboom {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double independent = 1e-4;  // eigenvalues of a Gram matrix (unit diagonal) above this: digits lost below 100
+constexpr int max_rounds = 6;         // each takes directions 100 times shorter than the one before
+
+/// M-norms of columns, given M W.
+VectorXd norms(const MatrixXd& W, const MatrixXd& M_W) {
+  return W.cwiseProduct(M_W).colwise().sum().transpose().cwiseMax(0).cwiseSqrt();
+}
+
+/// X such that W X is nearly orthonormal, from G = W^T M W: the directions that are well apart from each other.
+/// Columns of W no longer than `cut` count as zero. Stathopoulos, Wu, SIAM J. Sci. Comput. 23 (2002) 2165.
+MatrixXd well_apart(const MatrixXd& G, double cut) {
+  const VectorXd length = G.diagonal().cwiseMax(0).cwiseSqrt();
+  const VectorXd D = length.unaryExpr([cut](double x) { return x > cut ? 1 / x : 0; });
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(D.asDiagonal() * G * D.asDiagonal());
+  const VectorXd& w = eigen.eigenvalues();
+  const Index kept = (w.array() > independent * w(w.size() - 1)).count();
+  if (!(w(w.size() - 1) > 0)) return MatrixXd(G.rows(), 0);
+  return D.asDiagonal() * eigen.eigenvectors().rightCols(kept) * w.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+}
+
+}  // namespace
+
+MatrixXd random_block(Index n, Index columns, std::uint64_t seed) {
+  MatrixXd block(n, columns);
+  std::uint64_t state = seed;
+  for (double& entry : block.reshaped()) {  // SplitMix64: Steele, Lea, Flood, OOPSLA 2014
+    std::uint64_t z = state += 0x9e3779b97f4a7c15;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
+    entry = static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53 - 0.5;
+  }
+  return block;
+}
+
+MassBasis::MassBasis(const SparseMatrix& M, Index capacity) : M_(M), V_(M.rows(), capacity), P_(M.rows(), capacity) {}
+
+MatrixXd MassBasis::project_out(MatrixXd& W) const {
+  MatrixXd coefficients = P_.leftCols(size_).transpose() * W;
+  W.noalias() -= V_.leftCols(size_) * coefficients;
+  return coefficients;
+}
+
+MatrixXd MassBasis::append(MatrixXd W, double negligible) {
+  const Index before = size_;
+  const Index room = std::min(before + W.cols(), capacity());
+  MatrixXd all = MatrixXd::Zero(room, W.cols());
+  all.topRows(before) = project_out(W);
+  double cut = -1;
+  for (int round = 0; round < max_rounds && size_ < room; ++round) {
+    all.topRows(size_) += project_out(W);  // twice is enough (Parlett 6.9)
+    const MatrixXd M_W = symmetric_product(M_, W);
+    const VectorXd left = norms(W, M_W);
+    if (cut < 0) cut = negligible * (left.cwiseAbs2() + all.colwise().squaredNorm().transpose()).cwiseSqrt().maxCoeff();
+    const MatrixXd G = W.transpose() * M_W;
+    const MatrixXd X = well_apart((G + G.transpose()) / 2, cut);
+    const Index added = std::min(X.cols(), room - size_);
+    if (added == 0) break;
+    auto Q = V_.middleCols(size_, added);
+    auto P = P_.middleCols(size_, added);
+    Q.noalias() = W * X.rightCols(added);
+    P.noalias() = M_W * X.rightCols(added);
+    const Eigen::LLT<MatrixXd> polish(Q.transpose() * P);
+    polish.matrixU().solveInPlace<Eigen::OnTheRight>(Q);
+    polish.matrixU().solveInPlace<Eigen::OnTheRight>(P);
+    const MatrixXd inside = P.transpose() * W;
+    all.middleRows(size_, added) = inside;
+    size_ += added;
+    if (added == W.cols()) break;
+    W.noalias() -= Q * inside;
+  }
+  return all.topRows(size_);
+}
+
+void MassBasis::rotate(const MatrixXd& S) {
+  const Index tail = size_ - S.rows();
+  for (MatrixXd* X : {&V_, &P_}) {
+    // By slices of rows, so that the copy stays small.
+    constexpr Index slice = 512;
+    MatrixXd rows;
+    for (Index first = 0; first < X->rows(); first += slice) {
+      const Index height = std::min(slice, X->rows() - first);
+      rows.noalias() = X->block(first, 0, height, S.rows()) * S;
+      const MatrixXd rest = X->block(first, S.rows(), height, tail);
+      X->block(first, 0, height, S.cols()) = rows;
+      X->block(first, S.cols(), height, tail) = rest;
+    }
+  }
+  size_ = S.cols() + tail;
+}
+
+}  // namespace flexboom

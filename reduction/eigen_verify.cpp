@@ -1,0 +1,191 @@
+#include "reduction/eigen_verify.hpp"
+
+#include "fem/check.hpp"
+#include "fem/inertia.hpp"
+#include "reduction/eigen_basis.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index slab = 32;   // columns that are solved for at a time
+constexpr Index probes = 6;  // random vectors that look for modes missed
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double hertz(double lambda) { return std::sqrt(std::max(0.0, lambda)) / (2 * std::numbers::pi); }
+
+void sort(EigenPairs& pairs) {
+  std::vector<int> order(static_cast<size_t>(pairs.lambda.size()));
+  std::iota(order.begin(), order.end(), 0);
+  if (std::ranges::is_sorted(pairs.lambda)) return;
+  std::ranges::stable_sort(order, {}, [&](int i) { return pairs.lambda(i); });
+  pairs.lambda = pairs.lambda(order).eval();
+  pairs.Phi = pairs.Phi(Eigen::all, order).eval();
+}
+
+double distance_from_identity(const MatrixXd& gram) {
+  return (gram - MatrixXd::Identity(gram.rows(), gram.cols())).cwiseAbs().maxCoeff();
+}
+
+/// Gram-Schmidt in the M inner product, as a Cholesky factor of Phi^T M Phi. It only polishes: vectors that are far
+/// from orthonormal mean that the backend returned one mode twice. Returns M Phi.
+MatrixXd orthonormalise(const EigenProblem& p, MatrixXd& Phi) {
+  MatrixXd M_Phi = symmetric_product(p.M, Phi);
+  const MatrixXd gram = Phi.transpose() * M_Phi;
+  const double error = distance_from_identity(gram);
+  if (!(error < 1e-6)) throw NumericalError(fmt::format("modes are not M-orthonormal, error {:.2g}", error));
+  const Eigen::LLT<MatrixXd> llt(gram);
+  llt.matrixU().solveInPlace<Eigen::OnTheRight>(Phi);
+  llt.matrixU().solveInPlace<Eigen::OnTheRight>(M_Phi);
+  return M_Phi;
+}
+
+/// Residual of each pair in the shift-inverted problem: |(K - sigma M)^-1 M phi - phi / (lambda - sigma)|_M (lambda -
+/// sigma), a bound of the relative error of lambda - sigma. Read from the factor that is in place.
+VectorXd residuals(const EigenProblem& p, const SparseFactor& shifted, const EigenPairs& pairs, const MatrixXd& M_Phi) {
+  VectorXd result(pairs.lambda.size());
+  for (Index first = 0; first < result.size(); first += slab) {
+    const Index width = std::min(slab, result.size() - first);
+    MatrixXd W(p.K.rows(), width);
+    shifted.solve(M_Phi.middleCols(first, width), W);
+    W *= (pairs.lambda.segment(first, width).array() - pairs.summary.sigma).matrix().asDiagonal();
+    W -= pairs.Phi.middleCols(first, width);
+    const MatrixXd M_W = symmetric_product(p.M, W);
+    result.segment(first, width) = W.cwiseProduct(M_W).colwise().sum().transpose().cwiseMax(0).cwiseSqrt();
+  }
+  return result;
+}
+
+/// Whether eigenvalues i and i + 1 are one to the accuracy they are known to. The measure is lambda - sigma, which is
+/// what the solver resolves; 1e-8 is ten times the noise that was seen in double frequencies of slender round bars.
+bool same_group(const EigenPairs& pairs, const VectorXd& residual, Index i) {
+  const double noise = 10 * std::max(residual(i), residual(i + 1));
+  return pairs.lambda(i + 1) - pairs.lambda(i) <= std::max(1e-8, noise) * (pairs.lambda(i + 1) - pairs.summary.sigma);
+}
+
+/// Number of modes up to the first gap that holds the wanted ones; 0 when the last group found reaches the end of the
+/// set.
+int modes_below_gap(const EigenPairs& pairs, const VectorXd& residual, int wanted, bool complete) {
+  const auto found = static_cast<int>(pairs.lambda.size());
+  for (int i = wanted; i < found; ++i) {
+    if (!same_group(pairs, residual, i - 1)) return i;
+  }
+  return complete ? found : 0;
+}
+
+/// Counts the eigenvalues below the shift in the gap above the first `expected` modes (Sylvester's law of inertia).
+void sturm_check(const EigenProblem& p, double flops, EigenSummary& s, int expected) {
+  const auto start = std::chrono::steady_clock::now();
+  const Inertia count = inertia(shifted(p.K, s.sturm_shift, p.M), flops);
+  s.sturm_checked = true;
+  s.sturm_count = count.negative;
+  s.sturm_method = count.method;
+  s.sturm_seconds = seconds_since(start);  // with the making of K - s M
+  if (s.sturm_count != expected) {
+    throw NumericalError(fmt::format("Sturm count: {} eigenvalues below {:.6g}, the solver found {}", s.sturm_count,
+                                     s.sturm_shift, expected));
+  }
+  s.proof = fmt::format("no mode below {:.6g} Hz is missed (Sturm count {} by {})", hertz(s.sturm_shift), s.sturm_count,
+                        s.sturm_method);
+}
+
+/// Looks for modes that are missing, from random vectors outside those found, taken through the inverse twice. Their
+/// Rayleigh quotients are never below the lowest eigenvalue that is missing (Courant-Fischer): one below the last mode
+/// found proves that a mode was missed, none makes it unlikely.
+void probe(const EigenProblem& p, const SparseFactor& shifted, EigenPairs& pairs, const MatrixXd& M_Phi, int expected) {
+  MatrixXd X(p.K.rows(), probes);
+  shifted.solve(symmetric_product(p.M, random_block(p.K.rows(), probes, 424242)), X);
+  X -= pairs.Phi * (M_Phi.transpose() * X).eval();
+  X.colwise().normalize();
+  const MatrixXd M_X = symmetric_product(p.M, X);
+  MatrixXd Y(p.K.rows(), probes);
+  shifted.solve(M_X, Y);
+  Y -= pairs.Phi * (M_Phi.transpose() * Y).eval();
+  // With A = K - sigma M: Y^T A Y = Y^T M X, so 1 / (lambda - sigma) are the eigenvalues of Y^T M Y against it.
+  const MatrixXd mass = quadratic_form(p.M, Y);
+  const MatrixXd energy = Y.transpose() * M_X;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> ritz(mass, (energy + energy.transpose()) / 2,
+                                                                Eigen::EigenvaluesOnly);
+  EigenSummary& s = pairs.summary;
+  const double lowest = s.sigma + 1 / ritz.eigenvalues().maxCoeff();
+  const double last = pairs.lambda(expected - 1);
+  if (ritz.info() == Eigen::Success && lowest - s.sigma < (1 - 1e-6) * (last - s.sigma)) {
+    throw NumericalError(
+        fmt::format("a search from random vectors found a mode below {:.6g} Hz that is missing", hertz(lowest)));
+  }
+  s.proof = fmt::format(
+      "completeness not proven: {} unknowns; ask for the Sturm count. A search from {} random vectors found nothing "
+      "below {:.6g} Hz",
+      p.K.rows(), probes, hertz(last));
+}
+
+/// Keeps the first `wanted` modes and lists the groups among them.
+void trim(EigenPairs& pairs, const VectorXd& residual, int wanted) {
+  for (int first = 0; first < wanted;) {
+    int last = first;
+    while (last + 1 < wanted && same_group(pairs, residual, last)) ++last;
+    if (last > first) {
+      std::vector<int>& group = pairs.summary.pairs.emplace_back(static_cast<size_t>(last - first + 1));
+      std::iota(group.begin(), group.end(), first);
+    }
+    first = last + 1;
+  }
+  pairs.lambda.conservativeResize(wanted);
+  pairs.Phi.conservativeResize(Eigen::NoChange, wanted);
+}
+
+bool counts(const ShiftedFactor& shifted, SturmPolicy policy) {
+  return policy == SturmPolicy::always ||
+         (policy == SturmPolicy::when_cheap && inertia_seconds(shifted.flops()) < cheap_inertia_seconds);
+}
+
+}  // namespace
+
+bool verify(const EigenProblem& p, ShiftedFactor& shifted, const EigenOptions& options, bool complete,
+            EigenPairs& pairs) {
+  const auto start = std::chrono::steady_clock::now();
+  EigenSummary& s = pairs.summary;
+  sort(pairs);
+  const int wanted = options.num_modes;
+  VectorXd residual;
+  int expected = 0;
+  {
+    const MatrixXd M_Phi = orthonormalise(p, pairs.Phi);
+    residual = residuals(p, shifted.factor(), pairs, M_Phi);
+    s.residual_max = residual.head(wanted).maxCoeff();
+    if (!(s.residual_max <= std::max(max_residual, 100 * options.tolerance)))
+      throw NumericalError(fmt::format("residual {:.2g} of the modes is too large", s.residual_max));
+    s.orthogonality_error = distance_from_identity(pairs.Phi.transpose() * M_Phi);
+    expected = modes_below_gap(pairs, residual, wanted, complete);
+    if (expected == 0) return false;
+    if (!counts(shifted, options.sturm)) probe(p, shifted.factor(), pairs, M_Phi, expected);
+  }
+  const double last = pairs.lambda(expected - 1);
+  const bool has_next = expected < pairs.lambda.size();
+  s.sturm_shift = has_next ? (last + pairs.lambda(expected)) / 2 : last + 0.1 * (last - s.sigma);
+  if (counts(shifted, options.sturm)) {
+    if (p.K.rows() > indefinite_unknowns) shifted.release();
+    sturm_check(p, shifted.flops(), s, expected);
+  }
+  trim(pairs, residual, options.whole_groups ? expected : wanted);
+  s.verify_seconds = seconds_since(start);
+  return true;
+}
+
+}  // namespace flexboom

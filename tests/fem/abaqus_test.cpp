@@ -1,0 +1,419 @@
+#include "fem/read_abaqus.hpp"
+
+#include "deck_testing.hpp"
+#include "fem/text_reader.hpp"
+
+#include <fmt/format.h>
+
+namespace flexboom::testing {
+namespace {
+
+using Eigen::Vector3d;
+
+MeshFile read(const std::string& text) { return read_abaqus(text, "deck.inp"); }
+
+// A cube of steel, 8000 kg, in every way of writing that both programs know.
+const std::string cube_nodes = R"(** a comment
+*Heading
+ any text, *even this
+*NODE , nset = Nall
+1, 0, 0, 0
+ 2, 1., 0, 0.
+3, 1.0E0, 1.D0, 0
+4, , 1
+5, 0, 0, 1
+6, 1, 0, 1
+7, 1, 1, 1
+8, 0, 1, 1
+*Element, type=c3d8i, ELSET=EALL
+1, 1, 2, 3, 4, 5, 6, 7, 8
+)";
+const std::string steel = "*MATERIAL, NAME=Steel\n*ELASTIC\n210e9, 0.3\n*DENSITY\n8000\n";
+const std::string cube = cube_nodes + steel + "*SOLIDSECTION, elset=eall, material=STEEL\n";
+
+TEST(Abaqus, CubeHasItsMassMaterialAndSets) {
+  const MeshFile file = read(cube);
+  EXPECT_EQ(file.mesh.nodes.cols(), 8);
+  ASSERT_EQ(file.mesh.elements.size(), 1U);
+  EXPECT_EQ(type_of(file.mesh.elements[0]).name, "hex8");
+  EXPECT_NEAR(total_mass(file.mesh), 8000, 1e-9);
+  EXPECT_EQ(file.mesh.solid_properties[0].name, "Steel");
+  EXPECT_EQ(file.mesh.solid_properties[0].material.E, 210e9);
+  EXPECT_EQ(node_set(file.mesh, "Nall").size(), 8U);
+  EXPECT_EQ(file.mesh.element_sets.at("EALL"), std::vector<int>{0});
+  EXPECT_EQ(file.modes, std::nullopt);
+}
+
+TEST(Abaqus, LineEndsOfWindowsAreNoPartOfNames) {
+  std::string text = cube;
+  for (size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += 2) text.insert(at, 1, '\r');
+  EXPECT_EQ(read(text).mesh.element_sets.count("EALL"), 1U);
+}
+
+struct Kind {
+  std::string deck, row;
+};
+
+class AbaqusKind : public ::testing::TestWithParam<Kind> {};
+
+// Nodes at their reference places, at most 16 numbers per line, the first with a comma at its end.
+TEST_P(AbaqusKind, ElementHasItsVolumeAndFaces) {
+  const ElementType& row = row_named(GetParam().row);
+  const Eigen::Matrix3Xd nodes = reference_nodes(row, row.orders().front());
+  std::string text = "*NODE\n", element = "7";
+  for (int i = 0; i < nodes.cols(); ++i) {
+    text += fmt::format("{}, {}, {}, {}\n", i + 10, nodes(0, i), nodes(1, i), nodes(2, i));
+    element += fmt::format(",{}{}", i == 14 ? "\n" : "", i + 10);
+  }
+  text += "*ELEMENT, TYPE=" + GetParam().deck + ", ELSET=E\n" + element + "\n" + steel +
+          "*SOLID SECTION, ELSET=E, MATERIAL=Steel\n";
+  const int faces = row.shape == Shape::hexahedron ? 6 : row.shape == Shape::wedge ? 5 : 4;
+  for (int f = 1; f <= faces; ++f) text += fmt::format("*SURFACE, NAME=F{}\n7, S{}\n", f, f);
+  const Mesh mesh = read(text).mesh;
+  ASSERT_EQ(mesh.elements.size(), 1U);
+  EXPECT_EQ(type_of(mesh.elements[0]).name, row.name);
+  EXPECT_EQ(mesh.element_labels[0], 7);
+  mesh.validate();
+  const double exact = row.shape == Shape::hexahedron ? 8 : row.shape == Shape::wedge ? 1 : 1.0 / 6;
+  EXPECT_NEAR(volume(mesh), exact, 1e-12);
+
+  // The nodes of each face are all nodes of a plane that bounds the element, and no two faces are one.
+  std::vector<std::vector<int>> seen;
+  for (int f = 1; f <= faces; ++f) {
+    const std::vector<int>& face = node_set(mesh, fmt::format("F{}", f));
+    seen.push_back(face);
+    const Vector3d a = mesh.nodes.col(face[0]);
+    Vector3d normal = Vector3d::Zero();
+    for (size_t i = 1; i < face.size(); ++i) {
+      for (size_t k = 1; k < i; ++k) {
+        const Vector3d n = (mesh.nodes.col(face[i]) - a).cross(mesh.nodes.col(face[k]) - a);
+        if (n.norm() > normal.norm()) normal = n;
+      }
+    }
+    const Eigen::VectorXd height = normal.normalized().transpose() * (mesh.nodes.colwise() - a);
+    EXPECT_TRUE(height.minCoeff() > -1e-12 || height.maxCoeff() < 1e-12) << f;
+    EXPECT_EQ((height.array().abs() < 1e-12).count(), std::ssize(face)) << f;
+  }
+  std::ranges::sort(seen);
+  EXPECT_EQ(std::ranges::adjacent_find(seen), seen.end());
+}
+
+INSTANTIATE_TEST_SUITE_P(All, AbaqusKind,
+                         ::testing::Values(Kind{"C3D4", "tet4"}, Kind{"C3D10", "tet10"}, Kind{"C3D8", "hex8"},
+                                           Kind{"C3D8I", "hex8"}, Kind{"C3D8R", "hex8-reduced"}, Kind{"C3D20", "hex20"},
+                                           Kind{"C3D20R", "hex20-reduced"}, Kind{"C3D6", "wedge6"},
+                                           Kind{"C3D15", "wedge15"}),
+                         [](const auto& kind) { return kind.param.deck; });
+
+TEST(Abaqus, SetsAreGeneratedJoinedAndExtended) {
+  const Mesh mesh = read(cube +
+                         "*NSET, NSET=Odd, GENERATE\n1, 99, 2\n*NSET, NSET=Some\nodd, 2\n*NSET, NSET=SOME\n4\n"
+                         "*NSET, NSET=OfElements, ELSET=Eall\n*ELSET, ELSET=Copy\nEall\n")
+                        .mesh;
+  EXPECT_EQ(node_set(mesh, "Odd"), (std::vector<int>{0, 2, 4, 6}));
+  EXPECT_EQ(node_set(mesh, "Some"), (std::vector<int>{0, 1, 2, 3, 4, 6}));
+  EXPECT_EQ(node_set(mesh, "OfElements").size(), 8U);
+  EXPECT_EQ(mesh.element_sets.at("Copy"), std::vector<int>{0});
+}
+
+TEST(Abaqus, SupportsByRangeNameAndNewStep) {
+  const std::string before = cube + "*BOUNDARY\n1, 1, 3\n2, XSYMM\n3, PINNED\n4, 2\n5, 3, , 0.1\n6, 11, 11, 20\n";
+  const MeshFile file = read(before);
+  EXPECT_EQ(held(file.mesh, 1), "123");
+  EXPECT_EQ(held(file.mesh, 2), "1");  // a solid has no rotations
+  EXPECT_EQ(held(file.mesh, 3), "123");
+  EXPECT_EQ(held(file.mesh, 4), "2");
+  EXPECT_EQ(held(file.mesh, 5), "3");
+  EXPECT_EQ(held(file.mesh, 6), "");
+  EXPECT_TRUE(has_note(file, "held at zero"));
+  const Mesh changed =
+      read(before + "*STEP\n*FREQUENCY\n3\n*BOUNDARY, OP=NEW\n7, 1\n*BOUNDARY, OP=NEW\n8, 2\n*END STEP\n").mesh;
+  EXPECT_EQ(changed.supports.size(), 2U);
+  EXPECT_EQ(held(changed, 7), "1");
+}
+
+TEST(Abaqus, FirstFrequencyStepCounts) {
+  const MeshFile file =
+      read(cube +
+           "*STEP\n*STATIC\n*CLOAD\n7, 1, 10.\n*END STEP\n*STEP\n*FREQUENCY, STORAGE=YES\n12, 1., 1e4\n"
+           "*NODE FILE\nU\n*END STEP\n*STEP\n*MODAL DYNAMIC\n0.1, 1\n*END STEP\n");
+  EXPECT_EQ(file.modes, 12);
+  EXPECT_TRUE(has_note(file, "*STATIC steps are not computed"));
+  EXPECT_TRUE(has_note(file, "limits of frequency"));
+  EXPECT_TRUE(has_note(file, "what follows the first *FREQUENCY step"));
+}
+
+TEST(Abaqus, PreloadOnlyCountsWhereItStiffens) {
+  const auto deck = [](const std::string& load, const std::string& modes) {
+    return cube + "*STEP" + load + "\n*STATIC\n*END STEP\n*STEP" + modes + "\n*FREQUENCY\n5\n*END STEP\n";
+  };
+  EXPECT_EQ(read(deck("", "")).modes, 5);
+  for (const auto& [load, modes] : {std::pair("", ", PERTURBATION"), std::pair(", NLGEOM", "")})
+    EXPECT_NE(input_error([&] { read(deck(load, modes)); }).find("starts from the loads of this step"),
+              std::string::npos);
+}
+
+TEST(Abaqus, NumbersThatCalculixCutsOffCountInFull) {
+  std::string text = cube;
+  text.replace(text.find("5, 0, 0, 1\n"), 11, "5, -3.62454980326159e-05, 0, 1\n");
+  const MeshFile file = read(text);
+  EXPECT_EQ(file.mesh.nodes(0, 4), -3.62454980326159e-05);
+  EXPECT_TRUE(has_note(file, "CalculiX reads 20 characters"));
+}
+
+// What mesh generators write: groups of lines and surfaces as elements, nodes of nothing, no material.
+TEST(Abaqus, GroupsOfLowerDimensionBecomeNodeSets) {
+  const MeshFile file = read(cube_nodes +
+                             "*NODE\n99, 5, 5, 5\n*ELEMENT, TYPE=CPS4, ELSET=Bottom\n2, 1, 2, 3, 4\n"
+                             "*ELEMENT, TYPE=T3D2, ELSET=Edge\n3, 1, 2\n");
+  EXPECT_EQ(file.mesh.elements.size(), 1U);
+  EXPECT_EQ(file.mesh.nodes.cols(), 8);
+  EXPECT_EQ(node_set(file.mesh, "Bottom").size(), 4U);
+  EXPECT_EQ(node_set(file.mesh, "Edge").size(), 2U);
+  EXPECT_EQ(file.mesh.solid_properties[0].material.E, 0);
+  EXPECT_TRUE(has_note(file, "give it one"));
+}
+
+std::string mast(const std::string& section) {
+  return "*NODE\n1, 0, 0, 0\n2, 0, 0, 1\n3, 0, 0, 2\n*ELEMENT, TYPE=B32, ELSET=Mast\n5, 1, 2, 3\n" + steel +
+         "*BEAM SECTION, ELSET=Mast, MATERIAL=Steel, " + section;
+}
+
+TEST(Abaqus, BeamSectionsAndTheirDirections) {
+  const Mesh mesh = read(mast("SECTION=RECT\n0.1, 0.4\n0, 1, 0\n")).mesh;
+  ASSERT_EQ(mesh.elements.size(), 2U);  // B32: two pieces
+  EXPECT_EQ(mesh.elements[1].nodes, (std::vector<int>{1, 2}));
+  EXPECT_EQ(mesh.element_labels, (std::vector<long>{5, 5}));
+  const BeamProperty& beam = mesh.beam_properties[0];
+  EXPECT_EQ(beam.y_axis, Vector3d::UnitY());
+  // Thickness 0.1 along direction 1 = y of the section: bending along it is the soft one.
+  const Section s = section_of(beam.start, 0.3, {});
+  EXPECT_NEAR(s.Iz, 0.4 * 0.001 / 12, 1e-12);
+  EXPECT_NEAR(s.Iy, 0.1 * 0.064 / 12, 1e-12);
+  EXPECT_NEAR(total_mass(mesh), 8000 * 0.04 * 2, 1e-9);
+
+  const auto area = [](const std::string& section) {
+    return section_of(read(mast(section)).mesh.beam_properties[0].start, 0.3, {}).A;
+  };
+  EXPECT_NEAR(area("SECTION=CIRC\n0.2, 0.2\n1, 0, 0\n"), pi * 0.01, 1e-14);  // CalculiX: diameters
+  EXPECT_NEAR(area("SECTION=CIRC\n0.2\n1, 0, 0\n"), pi * 0.04, 1e-14);       // Abaqus: a radius
+  EXPECT_NEAR(area("SECTION=PIPE\n0.2, 0.05\n1, 0, 0\n"), pi * (0.04 - 0.0225), 1e-14);
+  EXPECT_NEAR(area("SECTION=BOX\n0.4, 0.2, .01, .01, .01, .01\n1, 0, 0\n"), 0.08 - 0.38 * 0.18, 1e-14);
+}
+
+TEST(Abaqus, GeneralBeamSection) {
+  std::string text = mast("");
+  text.resize(text.find("*BEAM SECTION"));
+  const Mesh mesh = read(text +
+                         "*BEAM GENERAL SECTION, ELSET=Mast, DENSITY=1000\n0.01, 1e-5, 0, 3e-5, 2e-5\n1, 0, 0\n"
+                         "2.6e9, 1e9\n")
+                        .mesh;
+  const BeamProperty& beam = mesh.beam_properties[0];
+  EXPECT_NEAR(beam.material.nu, 0.3, 1e-12);
+  EXPECT_EQ(section_of(beam.start, 0.3, {}).Iy, 1e-5);  // I11: about direction 1 = y
+  EXPECT_EQ(section_of(beam.start, 0.3, {}).Iz, 3e-5);
+  EXPECT_NEAR(total_mass(mesh), 20, 1e-10);
+}
+
+TEST(Abaqus, MassOnRigidBodyAndSupportsOfItsRotations) {
+  const Mesh mesh =
+      read(cube +
+           "*NODE\n20, 0.5, 0.5, 3\n21, 0.5, 0.5, 3\n*ELEMENT, TYPE=MASS, ELSET=Lump\n9, 20\n*MASS, ELSET=Lump\n"
+           "12.5\n*NSET, NSET=Top\n5, 6, 7, 8\n*RIGID BODY, NSET=Top, REF NODE=20, ROT NODE=21\n"
+           "*BOUNDARY\n20, 1, 2\n21, 3\n")
+          .mesh;
+  ASSERT_EQ(mesh.rigid_connections.size(), 1U);
+  EXPECT_EQ(mesh.rigid_connections[0].nodes.size(), 4U);
+  EXPECT_EQ(held(mesh, 20), "126");  // rotation about z
+  EXPECT_EQ(mesh.nodes.cols(), 9);   // the rotation node is gone
+  EXPECT_NEAR(total_mass(mesh), 8012.5, 1e-9);
+  EXPECT_LT(rigid_residual(mesh), 1e-12);
+}
+
+// Two blocks, 1 x 1 and 2 x 2 elements in their faces: nodes of the fine one follow the coarse face.
+std::string blocks(double gap) {
+  std::string text = cube + "*NODE\n";
+  for (int k = 0; k < 2; ++k) {
+    for (int j = 0; j < 3; ++j) {
+      for (int i = 0; i < 3; ++i)
+        text += fmt::format("{}, {}, {}, {}\n", 100 + i + 3 * j + 9 * k, 0.5 * i, 0.5 * j, 1 + gap + k);
+    }
+  }
+  text += "*ELEMENT, TYPE=C3D8, ELSET=Fine\n";
+  for (int e = 0; e < 4; ++e) {
+    const int n = 100 + e % 2 + 3 * (e / 2);
+    text += fmt::format("{}, {}, {}, {}, {}, {}, {}, {}, {}\n", 10 + e, n, n + 1, n + 4, n + 3, n + 9, n + 10, n + 13,
+                        n + 12);
+  }
+  return text +
+         "*SOLID SECTION, ELSET=Fine, MATERIAL=Steel\n*SURFACE, NAME=Master\nEall, S2\n"
+         "*SURFACE, NAME=Slave\nFine, S1\n";
+}
+
+TEST(Abaqus, TieCarriesEveryLinearMotion) {
+  const MeshFile file = read(blocks(0.01) + "*TIE, NAME=Glue\nSlave, Master\n");
+  EXPECT_EQ(file.mesh.equations.size(), 27U);  // 9 nodes
+  EXPECT_TRUE(has_note(file, "9 slave nodes were moved"));
+  EXPECT_EQ(part_count(file.mesh), 1);
+  EXPECT_LT(rigid_residual(file.mesh), 1e-12);
+  const Assembly a = assemble(file.mesh);
+  Eigen::VectorXd u(a.dofs.count);  // u = (x + 2 y, 3 z, x - z): strains and turns
+  for (int node = 0; node < file.mesh.nodes.cols(); ++node) {
+    const Vector3d x = file.mesh.nodes.col(node);
+    u.segment<3>(a.dofs.of_node(node, 0)) << x(0) + 2 * x(1), 3 * x(2), x(0) - x(2);
+  }
+  EXPECT_LT(residual(file.mesh, a.dofs, u), 1e-12);
+  const Mesh kept = read(blocks(0.01) + "*TIE, NAME=Glue, ADJUST=NO\nSlave, Master\n").mesh;
+  EXPECT_NEAR(kept.nodes(2, node_labelled(kept, 104)), 1.01, 1e-15);
+}
+
+TEST(Abaqus, TieToleranceIsHeeded) {
+  EXPECT_NE(input_error([] { read(blocks(0.1) + "*TIE, NAME=G\nSlave, Master\n"); }).find("slave node"),
+            std::string::npos);
+  EXPECT_EQ(read(blocks(0.1) + "*TIE, NAME=G, POSITION TOLERANCE=0.2\nSlave, Master\n").mesh.equations.size(), 27U);
+}
+
+// Quadratic faces: a slave node anywhere on a curved face of C3D20 must be found and held without gap.
+TEST(Abaqus, TieFollowsCurvedFaces) {
+  const ElementType& row = row_named("hex20");
+  Eigen::Matrix3Xd nodes = reference_nodes(row, 2);
+  nodes.row(2) += 0.1 * nodes.row(0).cwiseProduct(nodes.row(0)) - 0.05 * nodes.row(1).cwiseProduct(nodes.row(1));
+  std::string text = "*NODE\n", element = "1";
+  for (int i = 0; i < 20; ++i) {
+    text += fmt::format("{}, {}, {}, {}\n", i + 1, nodes(0, i), nodes(1, i), nodes(2, i));
+    element += fmt::format(", {}", i + 1);
+  }
+  const double x = 0.3, y = -0.6;  // x and y are linear in the element
+  text += fmt::format("51, {}, {}, {}\n52, 2, 0, 3\n53, 0, 2, 3\n54, 0, 0, 4\n", x, y, 1 + 0.1 * x * x - 0.05 * y * y);
+  const Mesh mesh = read(text + "*ELEMENT, TYPE=C3D20, ELSET=E\n" + element +
+                         "\n*ELEMENT, TYPE=C3D4, ELSET=E\n2, 51, 52, 53, 54\n" + steel +
+                         "*SOLID SECTION, ELSET=E, MATERIAL=Steel\n*SURFACE, NAME=M\n1, S2\n"
+                         "*SURFACE, NAME=S, TYPE=NODE\n51\n*TIE, NAME=T, POSITION TOLERANCE=1e-9\nS, M\n")
+                        .mesh;
+  EXPECT_EQ(mesh.equations.size(), 3U);
+  EXPECT_LT(rigid_residual(mesh), 1e-12);
+}
+
+TEST(Abaqus, EquationsPairSetsAndTurnWithTransforms) {
+  const Mesh mesh = read(cube + "*NSET, NSET=A\n1, 2\n*NSET, NSET=B\n5, 6\n*EQUATION\n2\nA, 1, 1., B, 1, -1.\n").mesh;
+  ASSERT_EQ(mesh.equations.size(), 2U);
+  EXPECT_EQ(mesh.equations[1].terms[0].node, 1);
+  EXPECT_EQ(mesh.equations[1].terms[1].node, 5);
+
+  // Node 3 slides on the plane whose normal is (1, 1, 0); node 4 is held entirely, which no axes change.
+  const std::string turned = cube + "*TRANSFORM, NSET=T\n1, 1, 0, -1, 1, 0\n*NSET, NSET=T\n3, 4\n";
+  const Mesh slides = read(turned + "*BOUNDARY\n3, 1\n4, 1, 3\n").mesh;
+  ASSERT_EQ(slides.equations.size(), 1U);
+  ASSERT_EQ(slides.equations[0].terms.size(), 2U);
+  for (const auto& term : slides.equations[0].terms) EXPECT_NEAR(term.coefficient, std::sqrt(0.5), 1e-15);
+  EXPECT_EQ(held(slides, 4), "123");
+  EXPECT_EQ(held(read(turned + "*BOUNDARY\n3, 3\n").mesh, 3), "3");
+}
+
+TEST(Abaqus, CylindricalTransformIsRadialAtEachNode) {
+  const Mesh mesh = read(cube + "*TRANSFORM, NSET=Nall, TYPE=C\n0.5, 0.5, 0, 0.5, 0.5, 1\n*BOUNDARY\nNall, 2\n").mesh;
+  ASSERT_EQ(mesh.equations.size(), 8U);
+  for (const LinearEquation& equation : mesh.equations) {  // tangential: normal to the radius
+    double radial = 0;
+    for (const auto& term : equation.terms) radial += term.coefficient * (mesh.nodes(term.component, term.node) - 0.5);
+    EXPECT_NEAR(radial, 0, 1e-15);
+  }
+}
+
+TEST(Abaqus, MpcsJoinNodes) {
+  const std::string two = cube +
+                          "*NODE\n20, 0, 0, 2\n21, 0, 0, 3\n*ELEMENT, TYPE=B31, ELSET=Mast\n9, 20, 21\n"
+                          "*BEAM SECTION, ELSET=Mast, MATERIAL=Steel, SECTION=RECT\n0.1, 0.1\n1, 0, 0\n";
+  const Mesh beam = read(two + "*MPC\nBEAM, 5, 20\nBEAM, Nall, 20\n").mesh;
+  EXPECT_EQ(beam.rigid_connections.size(), 2U);
+  EXPECT_EQ(beam.rigid_connections[1].nodes.size(), 8U);
+  EXPECT_LT(rigid_residual(beam), 1e-12);
+  EXPECT_EQ(read(two + "*MPC\nTIE, 5, 20\n").mesh.equations.size(), 3U);  // node 5 has no rotations
+  const Mesh link = read(two + "*MPC\nLINK, 7, 20\n").mesh;
+  EXPECT_EQ(link.equations.size(), 1U);
+  EXPECT_LT(rigid_residual(link), 1e-12);
+}
+
+TEST(Abaqus, CouplingsBecomeRigidAndDistributing) {
+  const std::string top = cube +
+                          "*NODE\n20, 0.5, 0.5, 3\n*SURFACE, NAME=Top\nEall, S2\n"
+                          "*COUPLING, REF NODE=20, SURFACE=Top, CONSTRAINT NAME=C\n";
+  const Mesh kinematic = read(top + "*KINEMATIC\n1, 2\n").mesh;
+  ASSERT_EQ(kinematic.rigid_connections.size(), 1U);
+  EXPECT_EQ(kinematic.rigid_connections[0].components, (Components{true, true, false, false, false, false}));
+  const Mesh distributing = read(top + "*DISTRIBUTING\n1, 6\n").mesh;
+  ASSERT_EQ(distributing.distributing_connections.size(), 1U);
+  double sum = 0;
+  for (const double w : distributing.distributing_connections[0].weights) sum += w;
+  EXPECT_NEAR(sum, 1, 1e-15);  // the area
+  EXPECT_LT(rigid_residual(distributing), 1e-12);
+  const Mesh elements = read(cube +
+                             "*NODE\n20, 0.5, 0.5, 3\n*ELEMENT, TYPE=DCOUP3D, ELSET=D\n9, 20\n"
+                             "*DISTRIBUTING COUPLING, ELSET=D\n5, 2.\n6, 1.\n7, 1.\n")
+                            .mesh;
+  EXPECT_EQ(elements.distributing_connections[0].weights, (std::vector<double>{2, 1, 1}));
+}
+
+// As Abaqus/CAE writes: the nodes in a part, placed by an instance; reference points and sets in the assembly.
+TEST(Abaqus, OneInstanceOfOnePart) {
+  std::string part = cube;
+  part.erase(part.find("*MATERIAL"), steel.size());
+  const Mesh mesh =
+      read("*PART, NAME=Block\n" + part +
+           "*NSET, NSET=Set-1\n1\n*END PART\n*ASSEMBLY, NAME=A\n"
+           "*INSTANCE, NAME=Block-1, PART=Block\n10, 0, 0\n10, 0, 0, 10, 0, 1, 90\n*END INSTANCE\n"
+           "*NODE\n1, 10, 0, 5\n*NSET, NSET=RP\n1\n*NSET, NSET=Set-1, INSTANCE=Block-1, GENERATE\n5, 8, 1\n"
+           "*RIGID BODY, REF NODE=RP, PIN NSET=Set-1\n*END ASSEMBLY\n" +
+           steel + "*BOUNDARY\nBlock-1.Set-1, 1, 3\nRP, 6\nBlock-1.2, 2\n")
+          .mesh;
+  EXPECT_EQ(mesh.nodes.cols(), 9);
+  EXPECT_NEAR((mesh.nodes.col(1) - Vector3d(10, 1, 0)).norm(), 0, 1e-14);  // (1, 0, 0) moved and turned
+  EXPECT_EQ(node_set(mesh, "Set-1").size(), 4U);
+  EXPECT_EQ(node_set(mesh, "Block-1.Set-1"), std::vector<int>{0});
+  ASSERT_EQ(mesh.rigid_connections.size(), 1U);
+  EXPECT_NEAR(mesh.nodes(2, mesh.rigid_connections[0].reference), 5, 0);
+  EXPECT_EQ(mesh.supports.size(), 3U);
+  EXPECT_NEAR(total_mass(mesh), 8000, 1e-9);
+}
+
+TEST(Abaqus, IncludesAreRelativeToTheIncludingFile) {
+  const std::string path = test_deck("include_main.inp").string();
+  const MeshFile file = read_abaqus(file_bytes(path), path);
+  EXPECT_EQ(file.mesh.elements.size(), 1U);
+  EXPECT_EQ(file.modes, 4);
+  EXPECT_EQ(node_set(file.mesh, "Nall").size(), 8U);
+}
+
+TEST(Abaqus, ExplosionsOfSmallDecksAreStopped) {
+  std::string text = cube + "*NSET, NSET=Huge, GENERATE\n1, 900000000000, 1\n";  // only what exists
+  EXPECT_EQ(node_set(read(text).mesh, "Huge").size(), 8U);
+  for (int i = 0; i < 40; ++i) {  // each twice the one before
+    const std::string last = i == 0 ? "Nall" : fmt::format("S{}", i - 1);
+    text += fmt::format("*NSET, NSET=S{}\n{}, {}\n", i, last, last);
+  }
+  EXPECT_NE(input_error([&] { read(text); }).find("grow beyond"), std::string::npos);
+}
+
+// Lines "deck -> message without the folder".
+TEST(Decks, BrokenOnesAreReportedAsExpected) {
+  const std::filesystem::path folder = std::filesystem::path(FLEXBOOM_TEST_DATA) / "fem" / "broken_decks";
+  std::ifstream expected(folder / "expected.txt");
+  size_t count = 0;
+  for (std::string line; std::getline(expected, line);) {
+    const size_t arrow = line.find(" -> ");
+    if (line.starts_with('#') || arrow == std::string::npos) continue;
+    std::string message = input_error([&] { read_mesh(folder / line.substr(0, arrow)); });
+    const std::string prefix = folder.string() + "/";
+    for (size_t at = 0; (at = message.find(prefix, at)) != std::string::npos;) message.erase(at, prefix.size());
+    EXPECT_EQ(message, line.substr(arrow + 4)) << line.substr(0, arrow);
+    ++count;
+  }
+  size_t decks = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    decks += entry.path().extension() == ".inp" || entry.path().extension() == ".bdf";
+  EXPECT_EQ(count, decks);
+  EXPECT_GE(count, 70U);
+}
+
+}  // namespace
+}  // namespace flexboom::testing
