@@ -157,9 +157,10 @@ int modes_command(const ModesArguments& a, const CommonOptions& common) {
   if (!common.quiet) {
     for (const std::string& note : model.notes) print_note("note: " + note);
   }
-  const Assembly assembly = assemble(model.mesh, common.threads);
+  Assembly assembly = assemble(model.mesh, common.threads);
   stages.end("assemble");
-  const ModalBasis basis = clamped_modes(model.mesh, assembly, model.clamp, eigen_options(a, model), common.threads);
+  const ModalBasis basis =
+      clamped_modes_releasing(model.mesh, assembly, model.clamp, eigen_options(a, model), common.threads);
   stages.end("modes");
   if (!a.vtu.empty()) write_vtu(a.vtu, shapes_grid(model, assembly, basis));
   if (common.json) {

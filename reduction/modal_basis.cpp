@@ -189,12 +189,9 @@ ModalBasis finished(const Mesh& mesh, const Assembly& assembly, const Unknowns& 
   return basis;
 }
 
-}  // namespace
-
-ModalBasis clamped_modes(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const EigenOptions& options,
-                         int threads) {
-  const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
-  const SparseMatrix K = left.reduced(assembly.K);
+/// Modes of the unknowns that are left, given their stiffness.
+ModalBasis modes_of(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const Unknowns& left,
+                    const SparseMatrix& K, const EigenOptions& options, int threads) {
   const SparseMatrix M = left.reduced(assembly.M);
   const int rigid = rigid_freedoms(mesh, assembly.dofs, clamp);
   EigenOptions whole = options;  // half a pair cannot be aligned, so its other half is solved for as well
@@ -202,6 +199,22 @@ ModalBasis clamped_modes(const Mesh& mesh, const Assembly& assembly, const Clamp
   whole.whole_groups = true;
   const EigenPairs pairs = solve_modes({K, M, rigid > 0}, whole);
   return finished(mesh, assembly, left, pairs, options.num_modes, tip_node(mesh, clamp), rigid, threads);
+}
+
+}  // namespace
+
+ModalBasis clamped_modes(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const EigenOptions& options,
+                         int threads) {
+  const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
+  return modes_of(mesh, assembly, clamp, left, left.reduced(assembly.K), options, threads);
+}
+
+ModalBasis clamped_modes_releasing(const Mesh& mesh, Assembly& assembly, const Clamp& clamp,
+                                   const EigenOptions& options, int threads) {
+  const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
+  const SparseMatrix K = left.reduced(assembly.K);
+  assembly.K = SparseMatrix();
+  return modes_of(mesh, assembly, clamp, left, K, options, threads);
 }
 
 ModalBasis clamped_modes_of_kind(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, int count,

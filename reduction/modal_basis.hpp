@@ -28,6 +28,9 @@ struct ModalBasis {
 /// @throws InputError, NumericalError as solve_modes.
 ModalBasis clamped_modes(const Mesh&, const Assembly&, const Clamp&, const EigenOptions&, int threads = 1);
 
+/// The same for large meshes: K is released once its part over the unknowns is made (assembly.K is empty afterwards).
+ModalBasis clamped_modes_releasing(const Mesh&, Assembly&, const Clamp&, const EigenOptions&, int threads = 1);
+
 /// The first `count` modes of the given kinds (all kinds when empty). Asks for more modes of the body until there are
 /// enough.
 ModalBasis clamped_modes_of_kind(const Mesh&, const Assembly&, const Clamp&, int count,

@@ -40,7 +40,15 @@ TEST_P(LargeBackend, ClusterOfAHundredEqualStringsOnOneBase) {
 
 TEST_P(LargeBackend, AGroupMuchLargerThanWhatIsAsked) {
   const System s = strings(60, 40);  // 2400 unknowns: supernodal; every frequency 40 times
-  const EigenPairs pairs = solve_modes(s.problem(), options(10, GetParam()));
+  EigenPairs pairs;
+  try {
+    pairs = solve_modes(s.problem(), options(10, GetParam()));
+  } catch (const NumericalError& error) {
+    // A single Lanczos vector sees copies by round-off alone; where it misses some, the Sturm count must have said so.
+    EXPECT_NE(std::string(GetParam()), "block") << error.what();
+    EXPECT_NE(std::string(error.what()).find("Sturm count"), std::string::npos) << error.what();
+    return;
+  }
   for (int i = 0; i < 10; ++i) EXPECT_NEAR(pairs.lambda(i) / string_frequency(60, 1), 1, 1e-11) << i;
   EXPECT_EQ(pairs.summary.sturm_count, 40);
 }

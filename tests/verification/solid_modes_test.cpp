@@ -91,7 +91,7 @@ std::vector<Exact> diaphragm_rows(const std::string& bar_name) {
 }
 
 // Both end faces may not move in their plane and are free to move along the bar: one rigid motion is left.
-TEST(DiaphragmEnds, RoundBarHasTheExactFrequencies) {
+TEST(SlowDiaphragmEnds, RoundBarHasTheExactFrequencies) {
   Mesh mesh = make_solid_mesh(bar(RoundBar{0.01}, 0.03, aluminium), uniform(8, 1, 1, 2));
   for (const char* face : {"root", "tip"}) {
     for (const int node : node_set(mesh, face)) {
@@ -110,7 +110,7 @@ TEST(DiaphragmEnds, RoundBarHasTheExactFrequencies) {
 
 // Torsion of a clamped round bar is exact in elementary terms, (2 k - 1) sqrt(G / rho) / (4 L): no singularity at the
 // rim.
-TEST(ClampedRoundBar, HasTheExactTorsion) {
+TEST(SlowClampedRoundBar, HasTheExactTorsion) {
   const double length = 0.03;
   const Mesh mesh = make_solid_mesh(bar(RoundBar{0.01}, length, aluminium), uniform(8, 1, 1, 2));
   const ModalBasis basis = modes_of(mesh, node_set(mesh, "root"), 12);
