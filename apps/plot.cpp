@@ -11,9 +11,10 @@ namespace flexboom {
 
 namespace {
 
-constexpr std::array<const char*, 6> colours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"};
+constexpr std::array<const char*, 10> colours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
+                                                 "#56b4e9", "#000000", "#7f3c8d", "#80852d", "#8c564b"};
 constexpr const char* dashes = " stroke-dasharray=\"6 3\"";
-constexpr double left = 78, right = 130, top = 30, bottom = 44;
+constexpr double left = 78, right = 150, top = 30, bottom = 44;
 
 struct Axis {
   double low = 0, high = 1;
@@ -42,7 +43,10 @@ Axis axis_of(const std::vector<Curve>& curves, bool of_x, bool log) {
 std::vector<double> round_ticks(const Axis& a) {
   const double span = a.high - a.low;
   const double raw = span / 5, power = std::pow(10, std::floor(std::log10(raw)));
-  const double m = raw / power, step = power * (m < 1.5 ? 1 : m < 3.5 ? 2 : m < 7.5 ? 5 : 10);
+  const double m = raw / power, step = std::max(a.log ? 1.0 : 0.0, power * (m < 1.5   ? 1
+                                                                            : m < 3.5 ? 2
+                                                                            : m < 7.5 ? 5
+                                                                                      : 10));
   std::vector<double> ticks;
   for (double k = std::ceil(a.low / step); k * step <= a.high * (1 + 1e-12) + 1e-300; ++k) ticks.push_back(k * step);
   return ticks;
