@@ -1,4 +1,5 @@
 #include "fem/boom_profile.hpp"
+#include "fem/shape_functions.hpp"
 
 #include "fem/section_grid.hpp"
 
@@ -16,7 +17,9 @@ using Corners = std::array<int, 4>;  // counter-clockwise in (tau, x)
 class Builder {
  public:
   Builder(const std::vector<BoomLayer>& layers, const ProfileOptions& options)
-      : layers_(layers), options_(options), points_(((lobatto_points(options.order).array() + 1) / 2).matrix()) {}
+      : layers_(layers),
+        options_(options),
+        points_(((lobatto_basis(options.order).nodes().array() + 1) / 2).matrix()) {}
 
   Profile build() {
     add_vertices();

@@ -1,6 +1,7 @@
 #include "fem/section_grid.hpp"
 
 #include "fem/check.hpp"
+#include "fem/shape_functions.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -76,16 +77,15 @@ Vector2d line_point(const RectangularTube& tube, const SectionGrid&, double u, i
 }
 Vector2d line_point(const GeneralSection&, const SectionGrid&, double, int) { return Vector2d::Zero(); }
 
-struct Legendre {
-  double value;
-  double derivative;
-  double previous;
-};
-
-Legendre legendre(int n, double x) {
-  double p0 = 1, p1 = x;
-  for (int k = 2; k <= n; ++k) p0 = std::exchange(p1, ((2 * k - 1) * x * p1 - (k - 1) * p0) / k);
-  return {p1, n * (p0 - x * p1) / (1 - x * x), p0};
+/// P_n(x) by Bonnet's recursion.
+double legendre(int n, double x) {
+  double previous = 1, value = x;
+  for (int k = 2; k <= n; ++k) {
+    const double next = ((2 * k - 1) * x * value - (k - 1) * previous) / k;
+    previous = value;
+    value = next;
+  }
+  return n == 0 ? 1 : value;
 }
 
 }  // namespace
@@ -131,29 +131,10 @@ Vector2d core_point(const SectionGrid& grid, double a, double b) {
   return between(outline(3 - b), outline(b), a) + between(outline(3 + a), outline(2 - a), b) - corners;
 }
 
-Eigen::VectorXd lobatto_points(int order) {
-  Eigen::VectorXd points(order + 1);
-  points(0) = -1;
-  points(order) = 1;
-  for (int i = 1; i < order; ++i) {
-    double x = -std::cos(pi * i / order);
-    // Newton for P_n' = 0 with P_n'' = (2 x P_n' - n (n + 1) P_n) / (1 - x^2).
-    for (int step = 0; step < 20; ++step) {
-      const auto [p, dp, previous] = legendre(order, x);
-      const double move = dp * (1 - x * x) / (2 * x * dp - order * (order + 1) * p);
-      x -= move;
-      if (std::abs(move) < 1e-16) break;
-    }
-    points(i) = x;
-  }
-  points = (0.5 * (points - points.reverse())).eval();  // symmetric to the last bit
-  return points;
-}
-
 Eigen::VectorXd lobatto_weights(int order) {
-  Eigen::VectorXd weights = lobatto_points(order);
+  Eigen::VectorXd weights = lobatto_basis(order).nodes();
   for (double& w : weights) {
-    const double p = legendre(order, w).value;
+    const double p = legendre(order, w);
     w = 2 / (order * (order + 1) * p * p);
   }
   return weights;

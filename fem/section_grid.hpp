@@ -46,10 +46,7 @@ Eigen::Vector2d ring_point(const SectionGrid&, double u, double tau);
 /// Position (y, z) [m] of a point of the core.
 Eigen::Vector2d core_point(const SectionGrid&, double a, double b);
 
-/// The order + 1 Gauss-Lobatto-Legendre points of [-1, 1], ascending.
-Eigen::VectorXd lobatto_points(int order);
-
-/// Their weights (sum 2).
+/// Weights of the order + 1 Gauss-Lobatto-Legendre points of [-1, 1] (sum 2).
 Eigen::VectorXd lobatto_weights(int order);
 
 }  // namespace flexboom

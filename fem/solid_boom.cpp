@@ -1,4 +1,5 @@
 #include "fem/solid_boom.hpp"
+#include "fem/shape_functions.hpp"
 
 #include "fem/boom_plan.hpp"
 #include "fem/check.hpp"
@@ -24,7 +25,7 @@ constexpr double round_off = 1e-12;  // relative
 
 // Lobatto points of `count` equal cells of [0, 1].
 std::vector<double> cell_points(int count, int order) {
-  const Eigen::VectorXd points = lobatto_points(order);
+  const Eigen::VectorXd points = lobatto_basis(order).nodes();
   std::vector<double> all = {0};
   for (int cell = 0; cell < count; ++cell) {
     for (int i = 1; i <= order; ++i) all.push_back((cell + (1 + points(i)) / 2) / count);
@@ -194,7 +195,7 @@ void add_face_sets(Mesh& mesh, double length) {
 
 // Derivatives at Lobatto points of the polynomial through values there (barycentric weights).
 Eigen::MatrixXd differentiation(int order) {
-  const Eigen::VectorXd x = lobatto_points(order);
+  const Eigen::VectorXd x = lobatto_basis(order).nodes();
   Eigen::VectorXd weight = Eigen::VectorXd::Ones(order + 1);
   Eigen::MatrixXd D = Eigen::MatrixXd::Zero(order + 1, order + 1);
   for (int i = 0; i <= order; ++i) {

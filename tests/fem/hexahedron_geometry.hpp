@@ -2,6 +2,7 @@
 
 #include "fem/element.hpp"
 #include "fem/section_grid.hpp"
+#include "fem/shape_functions.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
@@ -21,7 +22,7 @@ struct Lagrange {
   Eigen::MatrixXd value, slope;
 };
 inline Lagrange lagrange(int order, const Eigen::VectorXd& points) {
-  const Eigen::VectorXd g = lobatto_points(order);
+  const Eigen::VectorXd g = lobatto_basis(order).nodes();
   Lagrange l{Eigen::MatrixXd(points.size(), g.size()), Eigen::MatrixXd(points.size(), g.size())};
   for (Eigen::Index k = 0; k < points.size(); ++k) {
     for (Eigen::Index i = 0; i < g.size(); ++i) {
@@ -104,7 +105,7 @@ inline Integrals integrals(const Mesh& mesh) {
 inline double worst_jacobian(const Mesh& mesh) {
   const int order = mesh.elements.front().order;
   double worst = 1;
-  for (const Eigen::VectorXd& points : {Eigen::VectorXd(lobatto_points(order)), gauss_rule(order + 2).points}) {
+  for (const Eigen::VectorXd& points : {Eigen::VectorXd(lobatto_basis(order).nodes()), gauss_rule(order + 2).points}) {
     const Geometry geometry(order, points);
     for (const Element& element : mesh.elements) {
       double least = 1e300, most = -1e300;
