@@ -77,11 +77,7 @@ VtkGrid shapes_grid(const Model& model, const Assembly& assembly, const ModalBas
   return grid;
 }
 
-double mass_of(const Mesh& mesh, const Assembly& assembly) {
-  return quadratic_form(assembly.M, rigid_motions(mesh, assembly.dofs).leftCols<1>())(0, 0);
-}
-
-ordered_json json_of(const Model& model, const Assembly& assembly, const ModalBasis& basis, const Stages& stages) {
+ordered_json json_of(const Model& model, const ModalBasis& basis, const Stages& stages) {
   const EigenSummary& s = basis.summary;
   const Eigen::VectorXd hz = basis.omega / (2 * std::numbers::pi);
   std::vector<std::string_view> kinds;
@@ -90,7 +86,7 @@ ordered_json json_of(const Model& model, const Assembly& assembly, const ModalBa
           {"kinds", kinds},
           {"dofs", basis.unknowns},
           {"elements", model.mesh.elements.size()},
-          {"mass", mass_of(model.mesh, assembly)},
+          {"mass", basis.mass},
           {"rigid_freedoms", basis.rigid_freedoms},
           {"seconds",
            {{"mesh", stages.seconds("mesh")},
@@ -120,10 +116,10 @@ ordered_json json_of(const Model& model, const Assembly& assembly, const ModalBa
           {"peak_memory_mb", peak_memory_mb()}};
 }
 
-void print_table(const Model& model, const Assembly& assembly, const ModalBasis& basis, const Stages& stages) {
+void print_table(const Model& model, const ModalBasis& basis, const Stages& stages) {
   const EigenSummary& s = basis.summary;
   fmt::print("{}: {} elements, {} unknowns, mass {:.9g} kg\n", model.name, model.mesh.elements.size(), basis.unknowns,
-             mass_of(model.mesh, assembly));
+             basis.mass);
   for (Eigen::Index k = 0; k < basis.omega.size(); ++k) {
     fmt::print("{:4}  {:18.10f} Hz  {}\n", k + 1, basis.omega(k) / (2 * std::numbers::pi),
                name_of(basis.kind[static_cast<size_t>(k)]));
@@ -164,9 +160,9 @@ int modes_command(const ModesArguments& a, const CommonOptions& common) {
   stages.end("modes");
   if (!a.vtu.empty()) write_vtu(a.vtu, shapes_grid(model, assembly, basis));
   if (common.json) {
-    fmt::print("{}\n", json_of(model, assembly, basis, stages).dump(2));
+    fmt::print("{}\n", json_of(model, basis, stages).dump(2));
   } else if (!common.quiet) {
-    print_table(model, assembly, basis, stages);
+    print_table(model, basis, stages);
   }
   return exit_ok;
 }

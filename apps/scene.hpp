@@ -25,7 +25,7 @@ struct BodyScene {
   BeamGeometry geometry;
   SolidOptions solid;              // [solid], how structure = "solid" is meshed
   DampingRule damping;             // none by default
-  std::string backend = "arpack";  // eigen-solver
+  std::string backend = "auto";  // eigen-solver: ARPACK for beams, blocks for large solids
 };
 
 /// A rigid hub. Inertia about its mass centre, which is the origin of its BRF.

@@ -196,11 +196,9 @@ void for_each_mass_point(const Mesh& mesh, const DofMap& dofs, const MeshMassPoi
   }
 }
 
-PointEnergies point_energies(const Mesh& mesh, const Assembly& assembly, const Eigen::Ref<const MatrixXd>& U,
-                             int threads) {
-  require(
-      U.rows() == assembly.dofs.count,
-      fmt::format("point_energies: vectors have {} entries, the mesh has {} freedoms", U.rows(), assembly.dofs.count));
+VectorXd strain_energies(const Mesh& mesh, const DofMap& dofs, const Eigen::Ref<const MatrixXd>& U, int threads) {
+  require(U.rows() == dofs.count,
+          fmt::format("strain_energies: vectors have {} entries, the mesh has {} freedoms", U.rows(), dofs.count));
   // Summed in blocks of fixed size, so that the result is the same for any number of threads.
   constexpr int block = 256;
   const auto elements = static_cast<int>(mesh.elements.size());
@@ -209,14 +207,21 @@ PointEnergies point_energies(const Mesh& mesh, const Assembly& assembly, const E
   parallel_for(threads, blocks, 1, [&](int b) {
     for (int e = b * block; e < std::min(elements, (b + 1) * block); ++e) {
       const Element& element = element_of(mesh, e);
-      const MatrixXd q = U(assembly.dofs.of_element(mesh, e), Eigen::all);
+      const MatrixXd q = U(dofs.of_element(mesh, e), Eigen::all);
       strain.col(b) += type_of(element).strain_energy(mesh, element, q);
     }
   });
-  PointEnergies energy;
-  energy.strain = strain.rowwise().sum();
-  energy.kinetic = (U.cwiseProduct(symmetric_product(assembly.M, U))).colwise().sum().transpose() / 2;
-  return energy;
+  return strain.rowwise().sum();
+}
+
+PointEnergies point_energies(const Mesh& mesh, const Assembly& assembly, const Eigen::Ref<const MatrixXd>& U,
+                             int threads) {
+  return {strain_energies(mesh, assembly.dofs, U, threads),
+          U.cwiseProduct(symmetric_product(assembly.M, U)).colwise().sum().transpose() / 2};
+}
+
+double total_mass(const Mesh& mesh, const Assembly& assembly) {
+  return quadratic_form(assembly.M, rigid_motions(mesh, assembly.dofs).leftCols<1>())(0, 0);
 }
 
 MatrixXd rigid_motions(const Mesh& mesh, const DofMap& dofs) {

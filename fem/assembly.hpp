@@ -41,8 +41,15 @@ using MeshMassPointVisitor = std::function<void(
     double dm, const Eigen::Vector3d& u0, const Eigen::Ref<const Eigen::Matrix3Xd>& N, std::span<const int> dofs)>;
 void for_each_mass_point(const Mesh&, const DofMap&, const MeshMassPointVisitor&, int extra = 0);
 
-/// Strain energies and generalised masses of full vectors (freedoms x k): the first summed over strain points, which
-/// keeps more digits than u^T K u.
+/// Mass of the whole mesh, t^T M t with a translation t [kg].
+double total_mass(const Mesh&, const Assembly&);
+
+/// Strain energies 1/2 u^T K u [J] of full vectors (freedoms x k), summed over strain points, which keeps more digits
+/// than the product with K.
+Eigen::VectorXd strain_energies(const Mesh&, const DofMap&, const Eigen::Ref<const Eigen::MatrixXd>& U,
+                                int threads = 1);
+
+/// The same with the generalised masses.
 struct PointEnergies {
   Eigen::VectorXd strain;   // 1/2 u^T K u [J]
   Eigen::VectorXd kinetic;  // 1/2 u^T M u

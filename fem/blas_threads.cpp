@@ -20,12 +20,22 @@ constexpr const char* kernels_variable = "OPENBLAS_CORETYPE";
 
 // Looked up by name, so that any BLAS will do and none has to be OpenBLAS.
 template <class Function>
-Function openblas(const char* name) {
+Function library(const char* name) {
   return reinterpret_cast<Function>(dlsym(RTLD_DEFAULT, name));
 }
 
+/// Depth of nested parallel regions that OpenMP starts threads for; nothing where the program has no OpenMP.
+int openmp_levels() {
+  const auto get = library<int (*)()>("omp_get_max_active_levels");
+  return get ? get() : 0;
+}
+
+void set_openmp_levels(int levels) {
+  if (const auto set = library<void (*)(int)>("omp_set_max_active_levels")) set(levels);
+}
+
 std::string openblas_text(const char* name) {
-  const auto text = openblas<const char* (*)()>(name);
+  const auto text = library<const char* (*)()>(name);
   return text ? text() : "";
 }
 
@@ -49,9 +59,13 @@ int idle_cores() {
 
 int set_blas_threads(int wanted) {
   const int threads = std::max(1, std::min(wanted, idle_cores()));
-  if (const auto set = openblas<void (*)(int)>("openblas_set_num_threads")) set(threads);
+  if (const auto set = library<void (*)(int)>("openblas_set_num_threads")) set(threads);
   return threads;
 }
+
+WithoutOpenMP::WithoutOpenMP() : levels_(openmp_levels()) { set_openmp_levels(0); }
+
+WithoutOpenMP::~WithoutOpenMP() { set_openmp_levels(levels_); }
 
 std::string blas_release() {
   std::istringstream config(openblas_text("openblas_get_config"));

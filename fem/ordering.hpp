@@ -15,8 +15,8 @@ struct Ordering {
   double flops = 0;              // multiplications and additions of a factorisation
 };
 
-/// The cheapest of approximate minimum degree, reverse Cuthill-McKee, METIS, and for slender bodies slices (METIS
-/// between cuts across the body). Unknowns whose columns are alike (the freedoms of a node) are ordered as one
+/// The cheapest of approximate minimum degree, reverse Cuthill-McKee and METIS; of slender bodies, of reverse
+/// Cuthill-McKee and slices (METIS between cuts across the body). Unknowns whose columns are alike (the freedoms of a node) are ordered as one
 /// (Ashcraft, SIAM J. Sci. Comput. 16 (1995) 1404); fill and work of each order are counted exactly along the
 /// elimination tree (Liu, SIAM J. Matrix Anal. 11 (1990) 134). Small matrices try minimum degree alone.
 Ordering fill_reducing_ordering(const SparseMatrix& lower_pattern);

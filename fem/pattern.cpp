@@ -131,7 +131,8 @@ void PatternMatrix::add_diagonal(int entity, const Eigen::Ref<const Eigen::Matri
   }
 }
 
-void PatternMatrix::add_block(int row_entity, int column_entity, const Eigen::Ref<const Eigen::MatrixXd>& block) {
+template <class Block>
+void PatternMatrix::add_block(int row_entity, int column_entity, const Block& block) {
   const auto first = graph_.neighbour.begin() + graph_.start[at(column_entity)];
   const auto last = graph_.neighbour.begin() + graph_.start[at(column_entity) + 1];
   const auto place = std::lower_bound(first, last, row_entity) - graph_.neighbour.begin();

@@ -40,7 +40,8 @@ class PatternMatrix {
 
  private:
   bool thin(int a, int b) const;
-  void add_block(int row_entity, int column_entity, const Eigen::Ref<const Eigen::MatrixXd>& block);
+  template <class Block>  // also a transposed one, without a copy
+  void add_block(int row_entity, int column_entity, const Block& block);
   void add_diagonal(int entity, const Eigen::Ref<const Eigen::MatrixXd>& lower);
 
   const EntityGraph& graph_;

@@ -1,5 +1,6 @@
 #include "fem/sparse_factor.hpp"
 
+#include "fem/blas_threads.hpp"
 #include "fem/check.hpp"
 #include "fem/ordering.hpp"
 
@@ -160,6 +161,7 @@ void SparseFactor::factorise(const SparseMatrix& A) {
           "sparse factorisation: the matrix has another pattern than the one analysed");
   impl_->factorised = false;
   const auto start = std::chrono::steady_clock::now();
+  const WithoutOpenMP alone;
   cholmod_sparse a = view(A);
   cholmod_factorize(&a, impl_->L, &impl_->common);
   if (impl_->common.status == CHOLMOD_NOT_POSDEF && impl_->kind == FactorKind::definite) impl_->require_definite();

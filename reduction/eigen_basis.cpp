@@ -1,5 +1,7 @@
 #include "reduction/eigen_basis.hpp"
 
+#include "fem/dense.hpp"
+
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
@@ -51,8 +53,8 @@ MatrixXd random_block(Index n, Index columns, std::uint64_t seed) {
 MassBasis::MassBasis(const SparseMatrix& M, Index capacity) : M_(M), V_(M.rows(), capacity), P_(M.rows(), capacity) {}
 
 MatrixXd MassBasis::project_out(MatrixXd& W) const {
-  MatrixXd coefficients = P_.leftCols(size_).transpose() * W;
-  W.noalias() -= V_.leftCols(size_) * coefficients;
+  MatrixXd coefficients = transposed_product(P_.leftCols(size_), W);
+  add_product(W, -1, Transposed::no, V_.leftCols(size_), coefficients);
   return coefficients;
 }
 
@@ -67,22 +69,22 @@ MatrixXd MassBasis::append(MatrixXd W, double negligible) {
     const MatrixXd M_W = symmetric_product(M_, W);
     const VectorXd left = norms(W, M_W);
     if (cut < 0) cut = negligible * (left.cwiseAbs2() + all.colwise().squaredNorm().transpose()).cwiseSqrt().maxCoeff();
-    const MatrixXd G = W.transpose() * M_W;
+    const MatrixXd G = transposed_product(W, M_W);
     const MatrixXd X = well_apart((G + G.transpose()) / 2, cut);
     const Index added = std::min(X.cols(), room - size_);
     if (added == 0) break;
     auto Q = V_.middleCols(size_, added);
     auto P = P_.middleCols(size_, added);
-    Q.noalias() = W * X.rightCols(added);
-    P.noalias() = M_W * X.rightCols(added);
-    const Eigen::LLT<MatrixXd> polish(Q.transpose() * P);
+    Q = product(W, X.rightCols(added));
+    P = product(M_W, X.rightCols(added));
+    const Eigen::LLT<MatrixXd> polish(transposed_product(Q, P));
     polish.matrixU().solveInPlace<Eigen::OnTheRight>(Q);
     polish.matrixU().solveInPlace<Eigen::OnTheRight>(P);
-    const MatrixXd inside = P.transpose() * W;
+    const MatrixXd inside = transposed_product(P, W);
     all.middleRows(size_, added) = inside;
     size_ += added;
     if (added == W.cols()) break;
-    W.noalias() -= Q * inside;
+    add_product(W, -1, Transposed::no, Q, inside);
   }
   return all.topRows(size_);
 }

@@ -1,6 +1,7 @@
 #include "reduction/eigen_verify.hpp"
 
 #include "fem/check.hpp"
+#include "fem/dense.hpp"
 #include "fem/inertia.hpp"
 #include "reduction/eigen_basis.hpp"
 
@@ -13,6 +14,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 namespace flexboom {
 namespace {
@@ -47,7 +49,7 @@ double distance_from_identity(const MatrixXd& gram) {
 /// from orthonormal mean that the backend returned one mode twice. Returns M Phi.
 MatrixXd orthonormalise(const EigenProblem& p, MatrixXd& Phi) {
   MatrixXd M_Phi = symmetric_product(p.M, Phi);
-  const MatrixXd gram = Phi.transpose() * M_Phi;
+  const MatrixXd gram = transposed_product(Phi, M_Phi);
   const double error = distance_from_identity(gram);
   if (!(error < 1e-6)) throw NumericalError(fmt::format("modes are not M-orthonormal, error {:.2g}", error));
   const Eigen::LLT<MatrixXd> llt(gram);
@@ -57,13 +59,20 @@ MatrixXd orthonormalise(const EigenProblem& p, MatrixXd& Phi) {
 }
 
 /// Residual of each pair in the shift-inverted problem: |(K - sigma M)^-1 M phi - phi / (lambda - sigma)|_M (lambda -
-/// sigma), a bound of the relative error of lambda - sigma. Read from the factor that is in place.
-VectorXd residuals(const EigenProblem& p, const SparseFactor& shifted, const EigenPairs& pairs, const MatrixXd& M_Phi) {
+/// sigma), a bound of the relative error of lambda - sigma. Read from the factor that is in place. The columns of
+/// `rider` are solved for on the way.
+VectorXd residuals(const EigenProblem& p, const SparseFactor& shifted, const EigenPairs& pairs, const MatrixXd& M_Phi,
+                   MatrixXd& rider) {
   VectorXd result(pairs.lambda.size());
   for (Index first = 0; first < result.size(); first += slab) {
     const Index width = std::min(slab, result.size() - first);
-    MatrixXd W(p.K.rows(), width);
-    shifted.solve(M_Phi.middleCols(first, width), W);
+    const bool last = first + width == result.size();
+    MatrixXd W(p.K.rows(), width + (last ? rider.cols() : 0));
+    W.leftCols(width) = M_Phi.middleCols(first, width);
+    if (last) W.rightCols(rider.cols()) = rider;
+    shifted.solve(W, W);
+    if (last) rider = W.rightCols(rider.cols());
+    W.conservativeResize(Eigen::NoChange, width);
     W *= (pairs.lambda.segment(first, width).array() - pairs.summary.sigma).matrix().asDiagonal();
     W -= pairs.Phi.middleCols(first, width);
     const MatrixXd M_W = symmetric_product(p.M, W);
@@ -106,18 +115,17 @@ void sturm_check(const EigenProblem& p, double flops, EigenSummary& s, int expec
                         s.sturm_method);
 }
 
-/// Looks for modes that are missing, from random vectors outside those found, taken through the inverse twice. Their
+/// Looks for modes that are missing: X are random vectors that went through the inverse once, and once more here. Their
 /// Rayleigh quotients are never below the lowest eigenvalue that is missing (Courant-Fischer): one below the last mode
 /// found proves that a mode was missed, none makes it unlikely.
-void probe(const EigenProblem& p, const SparseFactor& shifted, EigenPairs& pairs, const MatrixXd& M_Phi, int expected) {
-  MatrixXd X(p.K.rows(), probes);
-  shifted.solve(symmetric_product(p.M, random_block(p.K.rows(), probes, 424242)), X);
-  X -= pairs.Phi * (M_Phi.transpose() * X).eval();
+void probe(const EigenProblem& p, const SparseFactor& shifted, EigenPairs& pairs, const MatrixXd& M_Phi, MatrixXd X,
+           int expected) {
+  add_product(X, -1, Transposed::no, pairs.Phi, transposed_product(M_Phi, X));
   X.colwise().normalize();
   const MatrixXd M_X = symmetric_product(p.M, X);
   MatrixXd Y(p.K.rows(), probes);
   shifted.solve(M_X, Y);
-  Y -= pairs.Phi * (M_Phi.transpose() * Y).eval();
+  add_product(Y, -1, Transposed::no, pairs.Phi, transposed_product(M_Phi, Y));
   // With A = K - sigma M: Y^T A Y = Y^T M X, so 1 / (lambda - sigma) are the eigenvalues of Y^T M Y against it.
   const MatrixXd mass = quadratic_form(p.M, Y);
   const MatrixXd energy = Y.transpose() * M_X;
@@ -168,14 +176,17 @@ bool verify(const EigenProblem& p, ShiftedFactor& shifted, const EigenOptions& o
   int expected = 0;
   {
     const MatrixXd M_Phi = orthonormalise(p, pairs.Phi);
-    residual = residuals(p, shifted.factor(), pairs, M_Phi);
+    const bool counted = counts(shifted, options.sturm);
+    MatrixXd X(p.K.rows(), 0);
+    if (!counted) X = symmetric_product(p.M, random_block(p.K.rows(), probes, 424242));
+    residual = residuals(p, shifted.factor(), pairs, M_Phi, X);
     s.residual_max = residual.head(wanted).maxCoeff();
     if (!(s.residual_max <= std::max(max_residual, 100 * options.tolerance)))
       throw NumericalError(fmt::format("residual {:.2g} of the modes is too large", s.residual_max));
-    s.orthogonality_error = distance_from_identity(pairs.Phi.transpose() * M_Phi);
+    s.orthogonality_error = distance_from_identity(transposed_product(pairs.Phi, M_Phi));
     expected = modes_below_gap(pairs, residual, wanted, complete);
     if (expected == 0) return false;
-    if (!counts(shifted, options.sturm)) probe(p, shifted.factor(), pairs, M_Phi, expected);
+    if (!counted) probe(p, shifted.factor(), pairs, M_Phi, std::move(X), expected);
   }
   const double last = pairs.lambda(expected - 1);
   const bool has_next = expected < pairs.lambda.size();

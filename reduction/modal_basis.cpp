@@ -132,10 +132,6 @@ double length_of(const Mesh& mesh) {
   return (mesh.nodes.rowwise().maxCoeff() - mesh.nodes.rowwise().minCoeff()).norm();
 }
 
-double mass_of(const Mesh& mesh, const Assembly& assembly) {
-  return quadratic_form(assembly.M, rigid_motions(mesh, assembly.dofs).leftCols<1>())(0, 0);
-}
-
 /// Renames the modes in the groups: mode i becomes new_index(i), and leaves if that is not in 0 .. count - 1.
 template <class NewIndex>
 void keep_modes(EigenSummary& summary, int count, const NewIndex& new_index) {
@@ -160,61 +156,75 @@ ModalBasis selected(const ModalBasis& basis, const std::vector<int>& modes) {
   return result;
 }
 
+/// A mesh whose constraints are eliminated: all that its modes need of the assembly.
+struct Reduced {
+  Unknowns unknowns;
+  SparseMatrix K, M;  // over the unknowns
+  VectorXd weights;   // diagonal of M over all freedoms
+  double mass = 0;    // [kg]
+};
+
 /// The first `wanted` modes over all freedoms of the mesh, aligned, of the right sign and size.
-ModalBasis finished(const Mesh& mesh, const Assembly& assembly, const Unknowns& unknowns, const EigenPairs& pairs,
-                    int wanted, int tip, int rigid, int threads) {
-  const double mass = mass_of(mesh, assembly);
+ModalBasis finished(const Mesh& mesh, const DofMap& dofs, const Reduced& reduced, const EigenPairs& pairs, int wanted,
+                    int tip, int rigid, int threads) {
   const double length = length_of(mesh);
-  MatrixXd Phi = unknowns.expanded(pairs.Phi);
-  align_groups(Phi, assembly.dofs, pairs.summary, tip, mass, length);
+  MatrixXd Phi = reduced.unknowns.expanded(pairs.Phi);
+  align_groups(Phi, dofs, pairs.summary, tip, reduced.mass, length);
 
   ModalBasis basis;
   basis.Phi = Phi.leftCols(wanted);
   basis.summary = pairs.summary;
-  basis.unknowns = unknowns.count;
+  basis.mass = reduced.mass;
+  basis.unknowns = reduced.unknowns.count;
   basis.rigid_freedoms = rigid;
-  basis.kind = mode_kinds(mesh, assembly, basis.Phi);
+  basis.kind = mode_kinds(mesh, dofs, reduced.weights, basis.Phi);
   std::fill_n(basis.kind.begin(), std::min(rigid, wanted), ModeKind::rigid);
-  const MatrixXd tip_motion = node_motion(assembly.dofs, basis.Phi, tip);
+  const MatrixXd tip_motion = node_motion(dofs, basis.Phi, tip);
   const int axis = long_axis(mesh);
   for (Index i = 0; i < wanted; ++i) {
     const int component = leading_component(basis.kind[static_cast<size_t>(i)], axis);
-    basis.Phi.col(i) *= scale_of(basis.Phi.col(i), tip_motion.col(i), component, mass, length);
+    basis.Phi.col(i) *= scale_of(basis.Phi.col(i), tip_motion.col(i), component, reduced.mass, length);
   }
   // Rayleigh quotients summed over element strains: phi^T K phi of a stiff, slender body cancels to noise in its last
   // digits.
-  const PointEnergies energy = point_energies(mesh, assembly, basis.Phi, threads);
-  basis.omega = energy.strain.cwiseQuotient(energy.kinetic).cwiseSqrt();
+  const VectorXd strain = strain_energies(mesh, dofs, basis.Phi, threads);
+  const MatrixXd X = basis.Phi(reduced.unknowns.free_dofs(), Eigen::all);
+  const VectorXd kinetic = X.cwiseProduct(symmetric_product(reduced.M, X)).colwise().sum().transpose() / 2;
+  basis.omega = strain.cwiseQuotient(kinetic).cwiseSqrt();
   keep_modes(basis.summary, wanted, [](int i) { return i; });
   return basis;
 }
 
-/// Modes of the unknowns that are left, given their stiffness.
-ModalBasis modes_of(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const Unknowns& left,
-                    const SparseMatrix& K, const EigenOptions& options, int threads) {
-  const SparseMatrix M = left.reduced(assembly.M);
-  const int rigid = rigid_freedoms(mesh, assembly.dofs, clamp);
+Reduced reduced(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp) {
+  Reduced result{unknowns(mesh, assembly.dofs, clamp), {}, {}, assembly.M.diagonal(), total_mass(mesh, assembly)};
+  result.K = result.unknowns.reduced(assembly.K);
+  result.M = result.unknowns.reduced(assembly.M);
+  return result;
+}
+
+ModalBasis modes_of(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp, const Reduced& reduced,
+                    const EigenOptions& options, int threads) {
+  const int rigid = rigid_freedoms(mesh, dofs, clamp);
   EigenOptions whole = options;  // half a pair cannot be aligned, so its other half is solved for as well
-  whole.num_modes = options.num_modes >= left.count ? options.num_modes : options.num_modes + 1;
+  whole.num_modes = options.num_modes >= reduced.unknowns.count ? options.num_modes : options.num_modes + 1;
   whole.whole_groups = true;
-  const EigenPairs pairs = solve_modes({K, M, rigid > 0}, whole);
-  return finished(mesh, assembly, left, pairs, options.num_modes, tip_node(mesh, clamp), rigid, threads);
+  const EigenPairs pairs = solve_modes({reduced.K, reduced.M, rigid > 0}, whole);
+  return finished(mesh, dofs, reduced, pairs, options.num_modes, tip_node(mesh, clamp), rigid, threads);
 }
 
 }  // namespace
 
 ModalBasis clamped_modes(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const EigenOptions& options,
                          int threads) {
-  const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
-  return modes_of(mesh, assembly, clamp, left, left.reduced(assembly.K), options, threads);
+  return modes_of(mesh, assembly.dofs, clamp, reduced(mesh, assembly, clamp), options, threads);
 }
 
 ModalBasis clamped_modes_releasing(const Mesh& mesh, Assembly& assembly, const Clamp& clamp,
                                    const EigenOptions& options, int threads) {
-  const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
-  const SparseMatrix K = left.reduced(assembly.K);
-  assembly.K = SparseMatrix();
-  return modes_of(mesh, assembly, clamp, left, K, options, threads);
+  const Reduced kept = reduced(mesh, assembly, clamp);
+  SparseMatrix().swap(assembly.K);  // an assigned empty matrix would keep the memory
+  SparseMatrix().swap(assembly.M);
+  return modes_of(mesh, assembly.dofs, clamp, kept, options, threads);
 }
 
 ModalBasis clamped_modes_of_kind(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, int count,

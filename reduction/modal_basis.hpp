@@ -17,6 +17,7 @@ struct ModalBasis {
   Eigen::VectorXd omega;       // [rad/s], ascending; within a group of equal frequencies to round-off
   std::vector<ModeKind> kind;  // one per mode
   EigenSummary summary;
+  double mass = 0;         // of the whole mesh [kg]
   int unknowns = 0;        // freedoms left in the eigenproblem
   int rigid_freedoms = 0;  // rigid motions that nothing holds: 6 of a free body
 };
@@ -28,7 +29,8 @@ struct ModalBasis {
 /// @throws InputError, NumericalError as solve_modes.
 ModalBasis clamped_modes(const Mesh&, const Assembly&, const Clamp&, const EigenOptions&, int threads = 1);
 
-/// The same for large meshes: K is released once its part over the unknowns is made (assembly.K is empty afterwards).
+/// The same for large meshes: K and M are released once their parts over the unknowns are made (both are empty
+/// afterwards).
 ModalBasis clamped_modes_releasing(const Mesh&, Assembly&, const Clamp&, const EigenOptions&, int threads = 1);
 
 /// The first `count` modes of the given kinds (all kinds when empty). Asks for more modes of the body until there are

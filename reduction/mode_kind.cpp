@@ -53,7 +53,7 @@ struct Slice {
 };
 
 /// Of solids: nodes, weighted by the diagonal of M, in slices across the long axis.
-Shares solid_shares(const Mesh& mesh, const Assembly& assembly, const MatrixXd& Phi) {
+Shares solid_shares(const Mesh& mesh, const DofMap& dofs, const Eigen::VectorXd& weights, const MatrixXd& Phi) {
   constexpr int slices = 64;
   const int axis = long_axis(mesh);
   const double start = mesh.nodes.row(axis).minCoeff();
@@ -65,11 +65,10 @@ Shares solid_shares(const Mesh& mesh, const Assembly& assembly, const MatrixXd& 
     s.spin.setZero(Phi.cols());
   }
   Shares shares = Shares::Zero(5, Phi.cols());
-  const Eigen::VectorXd weights = assembly.M.diagonal();
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;
   for (int node = 0; node < mesh.nodes.cols(); ++node) {
-    if (assembly.dofs.freedoms_of(node) < 3) continue;
-    const int first = assembly.dofs.of_node(node, 0);
+    if (dofs.freedoms_of(node) < 3) continue;
+    const int first = dofs.of_node(node, 0);
     const double weight = weights(first);
     const Vector3d r = mesh.nodes.col(node) - middle;
     const double station = (mesh.nodes(axis, node) - start) / extent * slices;
@@ -129,10 +128,11 @@ int long_axis(const Mesh& mesh) {
   return static_cast<int>(axis);
 }
 
-std::vector<ModeKind> mode_kinds(const Mesh& mesh, const Assembly& assembly, const Eigen::Ref<const MatrixXd>& Phi) {
+std::vector<ModeKind> mode_kinds(const Mesh& mesh, const DofMap& dofs, const Eigen::VectorXd& weights,
+                                 const Eigen::Ref<const MatrixXd>& Phi) {
   const bool beams =
       std::ranges::all_of(mesh.elements, [](const Element& e) { return type_of(e).shape == Shape::line; });
-  const Shares shares = beams ? beam_shares(mesh, assembly.dofs, Phi) : solid_shares(mesh, assembly, Phi);
+  const Shares shares = beams ? beam_shares(mesh, dofs, Phi) : solid_shares(mesh, dofs, weights, Phi);
   const int axis = long_axis(mesh);
   std::vector<ModeKind> kinds;
   for (Index i = 0; i < Phi.cols(); ++i) kinds.push_back(kind_of(shares.col(i), axis));

@@ -17,7 +17,9 @@ std::string_view name_of(ModeKind);
 int long_axis(const Mesh&);
 
 /// Kinds of shapes (freedoms x n) by their kinetic energy: a kind is named when more than half of the energy is the
-/// mean motion of the sections in that direction, or their twist. No mode is called rigid here.
-std::vector<ModeKind> mode_kinds(const Mesh&, const Assembly&, const Eigen::Ref<const Eigen::MatrixXd>& Phi);
+/// mean motion of the sections in that direction, or their twist. `weights` is the diagonal of M. No mode is called
+/// rigid here.
+std::vector<ModeKind> mode_kinds(const Mesh&, const DofMap&, const Eigen::VectorXd& weights,
+                                 const Eigen::Ref<const Eigen::MatrixXd>& Phi);
 
 }  // namespace flexboom

@@ -74,7 +74,7 @@ TEST(Assembly, PointEnergiesAreTheQuadraticForms) {
   EXPECT_NEAR(energy.strain(0) / (u.dot(full(a.K) * u) / 2), 1, 1e-13);
   EXPECT_NEAR(energy.kinetic(0) / (u.dot(full(a.M) * u) / 2), 1, 1e-13);
   EXPECT_EQ(input_error([&] { point_energies(mesh, a, VectorXd::Zero(3)); }),
-            "point_energies: vectors have 3 entries, the mesh has " + std::to_string(a.dofs.count) + " freedoms");
+            "strain_energies: vectors have 3 entries, the mesh has " + std::to_string(a.dofs.count) + " freedoms");
 }
 
 TEST(Assembly, NumbersNodesFirstThenElements) {

@@ -1,0 +1,44 @@
+#include "fem/dense.hpp"
+
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+
+// Fortran BLAS, 32-bit integers.
+extern "C" void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
+                       const double* alpha, const double* a, const int* lda, const double* b, const int* ldb,
+                       const double* beta, double* c, const int* ldc);
+
+namespace flexboom {
+
+using Eigen::MatrixXd;
+using Eigen::Ref;
+
+void add_product(Ref<MatrixXd> Y, double factor, Transposed transposed, const Ref<const MatrixXd>& A,
+                 const Ref<const MatrixXd>& X) {
+  const bool turned = transposed == Transposed::yes;
+  const Eigen::Index rows = turned ? A.cols() : A.rows(), inner = turned ? A.rows() : A.cols();
+  require(Y.rows() == rows && Y.cols() == X.cols() && X.rows() == inner,
+          fmt::format("product: {} x {} of {} x {}{} and {} x {}", Y.rows(), Y.cols(), A.rows(), A.cols(),
+                      turned ? " transposed" : "", X.rows(), X.cols()));
+  if (Y.size() == 0 || inner == 0) return;
+  const auto m = static_cast<int>(rows), n = static_cast<int>(Y.cols()), k = static_cast<int>(inner);
+  const auto lda = static_cast<int>(A.outerStride()), ldx = static_cast<int>(X.outerStride()),
+             ldy = static_cast<int>(Y.outerStride());
+  const double one = 1;
+  dgemm_(turned ? "T" : "N", "N", &m, &n, &k, &factor, A.data(), &lda, X.data(), &ldx, &one, Y.data(), &ldy);
+}
+
+MatrixXd transposed_product(const Ref<const MatrixXd>& A, const Ref<const MatrixXd>& X) {
+  MatrixXd Y = MatrixXd::Zero(A.cols(), X.cols());
+  add_product(Y, 1, Transposed::yes, A, X);
+  return Y;
+}
+
+MatrixXd product(const Ref<const MatrixXd>& A, const Ref<const MatrixXd>& X) {
+  MatrixXd Y = MatrixXd::Zero(A.rows(), X.cols());
+  add_product(Y, 1, Transposed::no, A, X);
+  return Y;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace flexboom {
+
+enum class Transposed { no, yes };
+
+/// Y += factor * A X, or A^T X, by the BLAS: its kernels are those of the processor that it runs on, Eigen's those of
+/// the processor that the program was compiled for. For tall blocks; Y is neither A nor X.
+void add_product(Eigen::Ref<Eigen::MatrixXd> Y, double factor, Transposed, const Eigen::Ref<const Eigen::MatrixXd>& A,
+                 const Eigen::Ref<const Eigen::MatrixXd>& X);
+
+/// A^T X by the BLAS.
+Eigen::MatrixXd transposed_product(const Eigen::Ref<const Eigen::MatrixXd>& A,
+                                   const Eigen::Ref<const Eigen::MatrixXd>& X);
+
+/// A X by the BLAS.
+Eigen::MatrixXd product(const Eigen::Ref<const Eigen::MatrixXd>& A, const Eigen::Ref<const Eigen::MatrixXd>& X);
+
+}  // namespace flexboom
