@@ -137,10 +137,11 @@ class Choice {
     if (order.size() != graph_.weight.size()) return;
     Ordering candidate;
     candidate.name = name;
-    count_cost(graph_, order, candidate);
+    std::vector<int> parent = count_cost(graph_, order, candidate);
     if (!best_.name.empty() && cost(candidate) >= cost(best_)) return;
     best_ = std::move(candidate);
     order_ = std::move(order);
+    parent_ = std::move(parent);
   }
 
   /// Whether a dissection, at 4e-7 s an edge, takes much less than the factorisation that it may shorten.
@@ -152,7 +153,7 @@ class Choice {
   Ordering result() const {
     if (best_.name.empty()) throw NumericalError("ordering: CHOLMOD made none");
     Ordering result = best_;
-    result.permutation = expanded(graph_, order_);
+    result.permutation = expanded(graph_, postordered(order_, parent_));
     return result;
   }
 
@@ -160,6 +161,7 @@ class Choice {
   const QuotientGraph& graph_;
   Ordering best_;
   std::vector<int> order_;
+  std::vector<int> parent_;  // elimination tree
 };
 
 }  // namespace

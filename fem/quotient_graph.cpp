@@ -111,7 +111,7 @@ QuotientGraph quotient_graph(const SparseMatrix& A) {
   return graph;
 }
 
-void count_cost(const QuotientGraph& graph, const std::vector<int>& order, Ordering& result) {
+std::vector<int> count_cost(const QuotientGraph& graph, const std::vector<int>& order, Ordering& result) {
   const int n = graph.size();
   std::vector<int> place(at(n)), parent(at(n), -1), ancestor(at(n), -1), mark(at(n), -1);
   for (int k = 0; k < n; ++k) place[at(order[at(k)])] = k;
@@ -135,6 +135,25 @@ void count_cost(const QuotientGraph& graph, const std::vector<int>& order, Order
     // sum over k = 0 .. w-1 of (b + w - k)^2
     result.flops += w * b * b + b * w * (w + 1) + w * (w + 1) * (2 * w + 1) / 6;
   }
+  return parent;
+}
+
+std::vector<int> postordered(const std::vector<int>& order, const std::vector<int>& parent) {
+  // A place comes right before its later siblings' subtrees are done; parents have higher places than their children,
+  // so sizes and positions of subtrees follow in one pass each.
+  std::vector<int> size(order.size(), 1), end(order.size());
+  for (size_t k = 0; k < order.size(); ++k) {
+    if (parent[k] >= 0) size[at(parent[k])] += size[k];
+  }
+  std::vector<int> result(order.size());
+  int roots_end = static_cast<int>(order.size());
+  for (size_t k = order.size(); k-- > 0;) {  // the last child stands right before its parent, and so on backwards
+    int& limit = parent[k] < 0 ? roots_end : end[at(parent[k])];
+    result[at(limit - 1)] = order[k];
+    end[k] = limit - 1;
+    limit -= size[k];
+  }
+  return result;
 }
 
 std::vector<int> expanded(const QuotientGraph& graph, const std::vector<int>& order) {

@@ -24,8 +24,12 @@ QuotientGraph quotient_graph(const SparseMatrix& lower_pattern);
 QuotientGraph subgraph(const QuotientGraph&, const std::vector<int>& members);
 
 /// Sets the fill and work of a Cholesky factorisation in the given order of groups, exactly, in time proportional to
-/// the entries of the quotient's factor.
-void count_cost(const QuotientGraph&, const std::vector<int>& order, Ordering& result);
+/// the entries of the quotient's factor. Returns the elimination tree: the parent of each place, -1 of roots.
+std::vector<int> count_cost(const QuotientGraph&, const std::vector<int>& order, Ordering& result);
+
+/// An equivalent order in which each subtree of the elimination tree is consecutive, which dense blocks of a factor
+/// want.
+std::vector<int> postordered(const std::vector<int>& order, const std::vector<int>& parent);
 
 /// The order of unknowns that an order of groups stands for.
 std::vector<int> expanded(const QuotientGraph&, const std::vector<int>& order);

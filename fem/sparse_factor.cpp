@@ -7,38 +7,71 @@
 #include <cholmod.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <utility>
+#include <vector>
 
 namespace flexboom {
 namespace {
 
-// A view of an Eigen matrix as CHOLMOD reads it: symmetric, lower triangle. CHOLMOD does not write through it.
-cholmod_sparse view(const SparseMatrix& A) {
-  cholmod_sparse result{};
-  result.nrow = static_cast<size_t>(A.rows());
-  result.ncol = static_cast<size_t>(A.cols());
-  result.nzmax = static_cast<size_t>(A.nonZeros());
-  result.p = const_cast<int*>(A.outerIndexPtr());
-  result.i = const_cast<int*>(A.innerIndexPtr());
-  result.x = const_cast<double*>(A.valuePtr());
-  result.stype = -1;
-  result.itype = CHOLMOD_INT;
-  result.xtype = CHOLMOD_REAL;
-  result.dtype = CHOLMOD_DOUBLE;
-  result.sorted = 1;
-  result.packed = 1;
-  return result;
-}
+/// P A P^T, lower triangle in columns whose rows are in no order: what CHOLMOD factorises as it is. Left to CHOLMOD,
+/// the same takes two passes at each analysis and factorisation.
+class PermutedMatrix {
+ public:
+  PermutedMatrix(const SparseMatrix& A, const std::vector<int>& place, bool with_values)
+      : start_(static_cast<size_t>(A.cols()) + 1, 0),
+        row_(static_cast<size_t>(A.nonZeros())),
+        value_(with_values ? row_.size() : 0) {
+    const auto at = [](Eigen::Index i) { return static_cast<size_t>(i); };
+    const auto for_each = [&](const auto& visit) {
+      for (Eigen::Index j = 0; j < A.cols(); ++j) {
+        const int q = place[at(j)];
+        for (SparseMatrix::InnerIterator it(A, j); it; ++it) {
+          if (it.row() >= j) visit(place[at(it.row())], q, it.value());
+        }
+      }
+    };
+    for_each([&](int p, int q, double) { ++start_[at(std::min(p, q)) + 1]; });
+    std::partial_sum(start_.begin(), start_.end(), start_.begin());
+    std::vector<int> next(start_.begin(), start_.end() - 1);
+    for_each([&](int p, int q, double value) {
+      const auto k = at(next[at(std::min(p, q))]++);
+      row_[k] = std::max(p, q);
+      if (with_values) value_[k] = value;
+    });
+  }
 
-cholmod_dense view(const Eigen::Ref<const Eigen::MatrixXd>& B) {
+  cholmod_sparse view() {
+    cholmod_sparse result{};
+    result.nrow = result.ncol = start_.size() - 1;
+    result.nzmax = row_.size();
+    result.p = start_.data();
+    result.i = row_.data();
+    result.x = value_.empty() ? nullptr : value_.data();
+    result.stype = -1;
+    result.itype = CHOLMOD_INT;
+    result.xtype = value_.empty() ? CHOLMOD_PATTERN : CHOLMOD_REAL;
+    result.dtype = CHOLMOD_DOUBLE;
+    result.sorted = 0;
+    result.packed = 1;
+    return result;
+  }
+
+ private:
+  std::vector<int> start_, row_;
+  std::vector<double> value_;
+};
+
+cholmod_dense view(Eigen::MatrixXd& B) {
   cholmod_dense result{};
   result.nrow = static_cast<size_t>(B.rows());
   result.ncol = static_cast<size_t>(B.cols());
-  result.d = static_cast<size_t>(B.outerStride());
-  result.nzmax = result.d * result.ncol;
-  result.x = const_cast<double*>(B.data());
+  result.d = result.nrow;
+  result.nzmax = result.nrow * result.ncol;
+  result.x = B.data();
   result.xtype = CHOLMOD_REAL;
   result.dtype = CHOLMOD_DOUBLE;
   return result;
@@ -70,6 +103,8 @@ struct SparseFactor::Impl {
   FactorKind kind;
   Eigen::Index size = 0;
   Eigen::Index entries = 0;
+  std::vector<int> place;         // of each unknown in the factor
+  Eigen::MatrixXd right, result;  // of a solve, in the order of the factor
   bool factorised = false;
   FactorSummary summary;
 
@@ -86,8 +121,8 @@ struct SparseFactor::Impl {
     common.nrelax[1] = 64;
     common.nrelax[2] = 200;
     common.nmethods = 1;
-    common.method[0].ordering = CHOLMOD_GIVEN;
-    common.postorder = 1;
+    common.method[0].ordering = CHOLMOD_NATURAL;  // what it gets is permuted
+    common.postorder = 0;
   }
   ~Impl() {
     cholmod_free_dense(&E, &common);
@@ -115,16 +150,22 @@ struct SparseFactor::Impl {
     }
   }
 
-  // CHOLMOD fills a result block that is large enough in place: B is read into its work block before X is written.
-  void solve(const Eigen::Ref<const Eigen::MatrixXd>& B, double* result) {
-    cholmod_dense rhs = view(B), x = rhs;
-    x.d = rhs.nrow;
-    x.nzmax = rhs.nrow * rhs.ncol;
-    x.x = result;
-    cholmod_dense* X = &x;
-    const int solved = cholmod_solve2(CHOLMOD_A, L, &rhs, nullptr, &X, nullptr, &Y, &E, &common);
+  // CHOLMOD fills a result block that is large enough in place.
+  void solve(const Eigen::Ref<const Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd> X) {
+    right.resize(B.rows(), B.cols());
+    result.resize(B.rows(), B.cols());
+    for (Eigen::Index c = 0; c < B.cols(); ++c) {
+      for (Eigen::Index i = 0; i < size; ++i) right(place[static_cast<size_t>(i)], c) = B(i, c);
+    }
+    cholmod_dense rhs = view(right), x = view(result);
+    cholmod_dense* filled = &x;
+    const int solved = cholmod_solve2(CHOLMOD_A, L, &rhs, nullptr, &filled, nullptr, &Y, &E, &common);
     check_status(common, "sparse solve");
-    if (!solved || X != &x || x.x != result) throw NumericalError("sparse solve: CHOLMOD did not fill the result");
+    if (!solved || filled != &x || x.x != result.data())
+      throw NumericalError("sparse solve: CHOLMOD did not fill the result");
+    for (Eigen::Index c = 0; c < B.cols(); ++c) {
+      for (Eigen::Index i = 0; i < size; ++i) X(i, c) = result(place[static_cast<size_t>(i)], c);
+    }
   }
 
   void require_definite() const {
@@ -141,10 +182,14 @@ SparseFactor::SparseFactor(const SparseMatrix& pattern, FactorKind kind) : impl_
   require(pattern.isCompressed(), "sparse factorisation: the matrix must be compressed");
   const auto start = std::chrono::steady_clock::now();
   Ordering order = fill_reducing_ordering(pattern);
-  cholmod_sparse A = view(pattern);
+  impl_->place.resize(order.permutation.size());
+  for (size_t k = 0; k < order.permutation.size(); ++k)
+    impl_->place[static_cast<size_t>(order.permutation[k])] = static_cast<int>(k);
+  PermutedMatrix permuted(pattern, impl_->place, false);
+  cholmod_sparse A = permuted.view();
   impl_->size = pattern.rows();
   impl_->entries = pattern.nonZeros();
-  impl_->L = cholmod_analyze_p(&A, order.permutation.data(), nullptr, 0, &impl_->common);
+  impl_->L = cholmod_analyze(&A, &impl_->common);
   check_status(impl_->common, "sparse analysis");
   impl_->summary.ordering = order.name;
   impl_->summary.flops = order.flops;
@@ -162,7 +207,8 @@ void SparseFactor::factorise(const SparseMatrix& A) {
   impl_->factorised = false;
   const auto start = std::chrono::steady_clock::now();
   const WithoutOpenMP alone;
-  cholmod_sparse a = view(A);
+  PermutedMatrix permuted(A, impl_->place, true);
+  cholmod_sparse a = permuted.view();
   cholmod_factorize(&a, impl_->L, &impl_->common);
   if (impl_->common.status == CHOLMOD_NOT_POSDEF && impl_->kind == FactorKind::definite) impl_->require_definite();
   check_status(impl_->common, "sparse factorisation");
@@ -180,13 +226,7 @@ void SparseFactor::solve(const Eigen::Ref<const Eigen::MatrixXd>& B, Eigen::Ref<
           fmt::format("sparse solve: {} x {} from {} x {}, the matrix has {} rows", X.rows(), X.cols(), B.rows(),
                       B.cols(), impl_->size));
   if (B.cols() == 0) return;
-  if (X.outerStride() == X.rows()) {
-    impl_->solve(B, X.data());
-    return;
-  }
-  Eigen::MatrixXd dense(X.rows(), X.cols());  // CHOLMOD writes only blocks without gaps between columns
-  impl_->solve(B, dense.data());
-  X = dense;
+  impl_->solve(B, X);
 }
 
 int SparseFactor::negative_pivots() const {
