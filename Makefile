@@ -1,20 +1,23 @@
 # Commands for people; the build itself is CMake (CMakePresets.json). Missing Debian packages are installed on the way.
-.PHONY: help run test asan slow bench format format-check tidy install-deps build-release build-asan
+.PHONY: help run test asan slow fuzz bench format format-check tidy install-deps build-release build-asan
 .DEFAULT_GOAL := help
 
 JOBS ?= $(shell nproc)
+FUZZ_SECONDS ?= 600
 
 packages := g++ cmake ninja-build \
   libeigen3-dev libsuitesparse-dev libmetis-dev libopenblas-dev libmumps-seq-dev libarpack2-dev libspectra-dev libsundials-dev \
   libcli11-dev libtomlplusplus-dev libpugixml-dev zlib1g-dev nlohmann-json3-dev libfmt-dev libgtest-dev libbenchmark-dev \
   python3 python3-numpy python3-scipy python3-meshio python3-vtk9 python3-h5py
 format tidy: packages += clang-format clang-tidy
+fuzz: packages += clang libclang-rt-14-dev
 
 sources = $(wildcard $(foreach folder,fem reduction dynamics apps tests tests/* tests/install/*,$(folder)/*.hpp $(folder)/*.cpp))
 
 help:
 	@echo "make run           build, fly the scene sport, write results/sport and its report"
 	@echo "make test          build and run the tests; asan: the same with sanitizers; slow: the long ones"
+	@echo "make fuzz          random bytes into the mesh readers, FUZZ_SECONDS for each (600), with sanitizers"
 	@echo "make bench         speed, measured"
 	@echo "make format, tidy  clang-format and clang-tidy over all sources"
 	@echo "make install-deps  install the Debian packages all of these need (done by each of them, too)"
@@ -33,6 +36,13 @@ asan: build-asan
 
 slow: build-release
 	ctest --preset slow -j $(JOBS)
+
+fuzz: install-deps
+	cmake --preset fuzz
+	cmake --build --preset fuzz -j $(JOBS)
+	@for reader in gmsh vtu abaqus nastran; do echo "== $$reader"; mkdir -p build/fuzz/corpus/$$reader; \
+	  build/fuzz/tests/fuzz/fuzz_$$reader -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=3000 -verbosity=0 -print_final_stats=1 \
+	    -artifact_prefix=build/fuzz/$$reader- build/fuzz/corpus/$$reader tests/fem/meshes tests/fem/broken_meshes || exit 1; done
 
 bench: build-release
 	@for program in build/release/tests/bench_*; do [ -x "$$program" ] && [ -f "$$program" ] || continue; \

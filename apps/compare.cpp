@@ -1,12 +1,12 @@
 #include "apps/compare.hpp"
 
 #include "fem/check.hpp"
+#include "fem/stopwatch.hpp"
 #include "reduction/eq14.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/SVD>
 
-#include <chrono>
 #include <cmath>
 #include <numbers>
 
@@ -61,7 +61,7 @@ double subspace_error(const Mesh& mesh, const Assembly& assembly, const ModalBas
 }
 
 OrderComparison compare_order(BodyScene b, const eq14::Boom& boom, int order, int count, int elements) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch start;
   b.geometry.order = order;
   for (BeamSegment& s : b.geometry.segments) s.elements = elements;
   const Mesh mesh = make_mesh(b.geometry);
@@ -72,7 +72,7 @@ OrderComparison compare_order(BodyScene b, const eq14::Boom& boom, int order, in
   const ModalBasis basis = clamped_modes_of_kind(mesh, assembly, clamp, count, {ModeKind::bending_y}, options);
   const ReducedBody body = reduce(mesh, assembly, basis, b.name);
   OrderComparison r;
-  r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  r.seconds = start.seconds();
   r.order = order;
   r.dofs = basis.unknowns;
   const double m = boom.mass_per_length * boom.length;

@@ -3,12 +3,12 @@
 #include "apps/version.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
+#include "fem/stopwatch.hpp"
 #include "fem/vtk.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <chrono>
 #include <cmath>
 #include <iterator>
 #include <numbers>
@@ -203,7 +203,7 @@ void write_motion(const RunResult& r, const fs::path& folder) {
 }
 
 ordered_json write_results(const RunResult& r, const fs::path& folder) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch start;
   const Flyable f = make_system(r.scene, r.bodies);
   for (const char* old :
        {"summary.json", "trajectory.csv", "events.csv", "motion.pvd", "report.html", "overview.svg"}) {
@@ -214,7 +214,7 @@ ordered_json write_results(const RunResult& r, const fs::path& folder) {
   write_file(folder / "trajectory.csv", [&r](std::ostream& out) { print_trajectory_csv(out, r.outputs); });
   write_file(folder / "events.csv", events_csv(f.system, r.trajectory));
   if (r.scene.vtu_step > 0) write_motion(r, folder);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = start.seconds();
   ordered_json summary = summary_json(r, seconds);
   write_file(folder / "summary.json", summary.dump(2) + "\n");
   return summary;

@@ -3,12 +3,12 @@
 #include "apps/error_budget.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
+#include "fem/stopwatch.hpp"
 #include "reduction/eq14.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -21,10 +21,6 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 PreparedBody prepare_eq14(const BodyScene& b) {
   const BeamSegment& segment = b.geometry.segments.at(0);
@@ -274,16 +270,16 @@ IntegratorOptions integrator_options(const Scene& scene, const System& system, c
 }  // namespace
 
 Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_steps) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch start;
   Run r;
   for (const BodyScene& b : scene.bodies) r.bodies.push_back(prepare_body(b, refine));
   const Flyable f = make_system(scene, r.bodies);
-  r.prepare_seconds = seconds_since(start);
-  const auto flight = std::chrono::steady_clock::now();
+  r.prepare_seconds = start.seconds();
+  const Stopwatch flight;
   IntegratorOptions options = integrator_options(scene, f.system, hooks);
   if (max_steps > 0) options.max_steps = max_steps;
   r.motion = integrate(f.system, f.y0, options);
-  r.integrate_seconds = seconds_since(flight);
+  r.integrate_seconds = flight.seconds();
   r.outputs = output_table(scene, f.system, r.motion);
   return r;
 }
@@ -351,9 +347,9 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks) {
     r.plan.push_back(fmt::format("error budget: not measured, its repeats would cost many times {} evaluations",
                                  run.motion.summary.rhs_evaluations));
   if (r.scene.error_budget && repeat && !run.motion.summary.interrupted) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch start;
     r.budget = measure_budget(r.scene, run, hooks, r.plan);
-    r.budget_seconds = seconds_since(start);
+    r.budget_seconds = start.seconds();
   }
   add_warnings(r);
   r.bodies = std::move(run.bodies);

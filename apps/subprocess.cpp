@@ -1,4 +1,5 @@
 #include "apps/subprocess.hpp"
+#include "fem/stopwatch.hpp"
 
 #include <fcntl.h>
 #include <sys/resource.h>
@@ -6,7 +7,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <chrono>
 #include <cstdlib>
 #include <sstream>
 
@@ -47,7 +47,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const std::fi
     result.exit_code = -1;
     return result;
   }
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch start;
   const pid_t child = fork();
   if (child == 0) become(command, folder, ends[1]);
   close(ends[1]);
@@ -57,7 +57,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const std::fi
   rusage usage = {};
   const bool ended = child > 0 && wait4(child, &status, 0, &usage) == child && WIFEXITED(status);
   result.exit_code = ended ? WEXITSTATUS(status) : -1;
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.seconds = start.seconds();
   result.memory_mb = static_cast<double>(usage.ru_maxrss) / 1024;
   return result;
 }

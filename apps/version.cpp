@@ -3,13 +3,15 @@
 #include "fem/inertia.hpp"
 
 #include <Spectra/Util/Version.h>
-#include <cholmod.h>
 #include <fmt/format.h>
 #include <sundials/sundials_config.h>
 #include <toml++/impl/version.h>
 #include <CLI/Version.hpp>
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
+
+#include <map>
+#include <string>
 
 namespace flexboom {
 
@@ -19,16 +21,16 @@ std::string version_text() {
     t += fmt::format("  {:<16} {:<8} {}\n", name, v, licence);
   };
   line("Eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION), "MPL-2.0");
-  line("CHOLMOD", fmt::format("{}.{}.{}", CHOLMOD_MAIN_VERSION, CHOLMOD_SUB_VERSION, CHOLMOD_SUBSUB_VERSION),
-       "LGPL-2.1+ (Core, Cholesky), GPL-2.0+ (Supernodal, MatrixOps)");
-  // What CHOLMOD and ARPACK bring along; their versions are those of the system that runs the program.
+  // Those of the system that runs the program.
+  std::map<std::string, std::string> running;
+  for (const auto& [name, release] : linear_algebra_versions()) running[name] = release;
+  line("CHOLMOD", running["cholmod"], "LGPL-2.1+ (Core, Cholesky), GPL-2.0+ (Supernodal, MatrixOps)");
+  // What CHOLMOD and ARPACK bring along.
   line("AMD, COLAMD", "", "BSD-3-Clause (with CAMD, CCOLAMD)");
   line("METIS", "", "Apache-2.0");
-  for (const InertiaMethod& method : inertia_methods()) {
-    if (method.name == "mumps") line("MUMPS", "", "CeCILL-C (sequential)");
-  }
+  if (running.contains("mumps")) line("MUMPS", running["mumps"], "CeCILL-C (sequential)");
   line("pugixml, zlib", "", "MIT, zlib");
-  line("OpenBLAS", "", "BSD-3-Clause (or another BLAS and LAPACK)");
+  line("BLAS, LAPACK", "", fmt::format("{}; OpenBLAS is BSD-3-Clause", running["blas"]).c_str());
   line("GNU runtime", "", "GPL-3.0+ with the runtime exception (libgomp, libgfortran)");
   line("ARPACK-NG", "3.8", "BSD-3-Clause");
   line("Spectra", fmt::format("{}.{}.{}", SPECTRA_MAJOR_VERSION, SPECTRA_MINOR_VERSION, SPECTRA_PATCH_VERSION),

@@ -3,12 +3,12 @@
 #include "dynamics/cvode.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
+#include "fem/stopwatch.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -185,11 +185,11 @@ class Flight {
         crossed_(contacts_.closed.size(), 0) {}
 
   Trajectory fly() {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch start;
     record(0.0, y_);
     stepper_->restart(0.0, y_, contacts_.closed, contacts_.armed);
     while (t_ < options_.duration && !stopped()) advance();
-    finish(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    finish(start.seconds());
     return std::move(result_);
   }
 

@@ -4,9 +4,9 @@
 #include "fem/check.hpp"
 #include "fem/inertia_methods.hpp"
 #include "fem/sparse_factor.hpp"
+#include "fem/stopwatch.hpp"
 
 #include <algorithm>
-#include <chrono>
 
 namespace flexboom {
 namespace {
@@ -45,9 +45,9 @@ Inertia cholmod_inertia(const SparseMatrix& A) {
 }
 
 Inertia inertia(const SparseMatrix& A, double flops) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch start;
   Inertia result = first_count(A, by_time(flops));
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.seconds = start.seconds();
   return result;
 }
 

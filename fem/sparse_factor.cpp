@@ -3,12 +3,12 @@
 #include "fem/blas_threads.hpp"
 #include "fem/check.hpp"
 #include "fem/ordering.hpp"
+#include "fem/stopwatch.hpp"
 
 #include <cholmod.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -86,10 +86,6 @@ void check_status(const cholmod_common& common, const char* what) {
                            ? "a pivot is zero: the matrix is singular; use another shift or clamp"
                            : "CHOLMOD failed";
   throw NumericalError(fmt::format("{}: {} (CHOLMOD status {})", what, reason, common.status));
-}
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 }  // namespace
@@ -180,7 +176,7 @@ SparseFactor::SparseFactor(const SparseMatrix& pattern, FactorKind kind) : impl_
       pattern.rows() == pattern.cols() && pattern.rows() > 0,
       fmt::format("sparse factorisation: the matrix is {} x {}; it must be square", pattern.rows(), pattern.cols()));
   require(pattern.isCompressed(), "sparse factorisation: the matrix must be compressed");
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch start;
   Ordering order = fill_reducing_ordering(pattern);
   impl_->place.resize(order.permutation.size());
   for (size_t k = 0; k < order.permutation.size(); ++k)
@@ -194,7 +190,7 @@ SparseFactor::SparseFactor(const SparseMatrix& pattern, FactorKind kind) : impl_
   impl_->summary.ordering = order.name;
   impl_->summary.flops = order.flops;
   impl_->summary.nonzeros = static_cast<long>(order.nonzeros);
-  impl_->summary.analyse_seconds = seconds_since(start);
+  impl_->summary.analyse_seconds = start.seconds();
 }
 
 SparseFactor::~SparseFactor() = default;
@@ -205,7 +201,7 @@ void SparseFactor::factorise(const SparseMatrix& A) {
   require(A.rows() == impl_->size && A.cols() == impl_->size && A.nonZeros() == impl_->entries && A.isCompressed(),
           "sparse factorisation: the matrix has another pattern than the one analysed");
   impl_->factorised = false;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch start;
   const WithoutOpenMP alone;
   PermutedMatrix permuted(A, impl_->place, true);
   cholmod_sparse a = permuted.view();
@@ -214,7 +210,7 @@ void SparseFactor::factorise(const SparseMatrix& A) {
   check_status(impl_->common, "sparse factorisation");
   impl_->check_pivots();
   impl_->factorised = true;
-  impl_->summary.factor_seconds = seconds_since(start);
+  impl_->summary.factor_seconds = start.seconds();
   const bool blocks = impl_->L->is_super != 0;
   impl_->summary.bytes =
       blocks ? 8.0 * static_cast<double>(impl_->L->xsize) : 12.0 * static_cast<double>(impl_->L->nzmax);
@@ -235,11 +231,6 @@ int SparseFactor::negative_pivots() const {
   int count = 0;
   for (Eigen::Index j = 0; j < impl_->size; ++j) count += impl_->pivot(j) < 0;
   return count;
-}
-
-double SparseFactor::rcond_estimate() const {
-  require(impl_->factorised, "condition: nothing is factorised");
-  return cholmod_rcond(impl_->L, &impl_->common);
 }
 
 std::string SparseFactor::library_release() {

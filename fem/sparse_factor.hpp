@@ -41,9 +41,6 @@ class SparseFactor {
   /// Number of negative entries of D: the eigenvalues of A below zero (Sylvester). Zero of a definite factor.
   int negative_pivots() const;
 
-  /// Rough reciprocal condition number, from the diagonal of the factor.
-  double rcond_estimate() const;
-
   FactorKind kind() const;
 
   /// "5.1.2", of CHOLMOD.

@@ -1,6 +1,7 @@
 #include "reduction/eigen_solver.hpp"
 
 #include "fem/check.hpp"
+#include "fem/stopwatch.hpp"
 #include "reduction/eigen_backends.hpp"
 #include "reduction/eigen_shift.hpp"
 #include "reduction/eigen_verify.hpp"
@@ -9,7 +10,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 
 namespace flexboom {
@@ -18,10 +18,6 @@ namespace {
 constexpr int extra_modes = 3;     // beyond those wanted, so that the Sturm count finds a gap
 constexpr int max_attempts = 4;    // the first and three with a moved shift
 constexpr int dense_limit = 1500;  // unknowns of the problems that go to the dense row by themselves
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 const EigenBackend& backend_named(const std::string& name) {
   std::string known;
@@ -80,10 +76,10 @@ EigenPairs verified_modes(const EigenProblem& p, ShiftedFactor& shifted, const E
   shifted.move_to(sigma);
   for (count = std::min(most, count);; count = std::min(most, 2 * count)) {
     const EigenBackend& backend = able(wanted, p, count);
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch start;
     EigenPairs pairs = backend.solve(p, shifted.factor(), {sigma, options.num_modes, count, options.tolerance});
     EigenSummary& s = pairs.summary;
-    s.eigen_seconds = seconds_since(start);
+    s.eigen_seconds = start.seconds();
     s.backend = std::string(backend.name);
     if (backend.name != wanted.name) s.backend += " (problem too small for " + std::string(wanted.name) + ")";
     s.sigma = sigma;

@@ -3,6 +3,7 @@
 #include "fem/check.hpp"
 #include "fem/dense.hpp"
 #include "fem/inertia.hpp"
+#include "fem/stopwatch.hpp"
 #include "reduction/eigen_basis.hpp"
 
 #include <fmt/format.h>
@@ -10,7 +11,6 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -25,10 +25,6 @@ using Eigen::VectorXd;
 
 constexpr Index slab = 32;   // columns that are solved for at a time
 constexpr Index probes = 6;  // random vectors that look for modes missed
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 double hertz(double lambda) { return std::sqrt(std::max(0.0, lambda)) / (2 * std::numbers::pi); }
 
@@ -101,12 +97,12 @@ int modes_below_gap(const EigenPairs& pairs, const VectorXd& residual, int wante
 
 /// Counts the eigenvalues below the shift in the gap above the first `expected` modes (Sylvester's law of inertia).
 void sturm_check(const EigenProblem& p, double flops, EigenSummary& s, int expected) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch start;
   const Inertia count = inertia(shifted(p.K, s.sturm_shift, p.M), flops);
   s.sturm_checked = true;
   s.sturm_count = count.negative;
   s.sturm_method = count.method;
-  s.sturm_seconds = seconds_since(start);  // with the making of K - s M
+  s.sturm_seconds = start.seconds();  // with the making of K - s M
   if (s.sturm_count != expected) {
     throw NumericalError(fmt::format("Sturm count: {} eigenvalues below {:.6g}, the solver found {}", s.sturm_count,
                                      s.sturm_shift, expected));
@@ -168,7 +164,7 @@ bool counts(const ShiftedFactor& shifted, SturmPolicy policy) {
 
 bool verify(const EigenProblem& p, ShiftedFactor& shifted, const EigenOptions& options, bool complete,
             EigenPairs& pairs) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch start;
   EigenSummary& s = pairs.summary;
   sort(pairs);
   const int wanted = options.num_modes;
@@ -196,7 +192,7 @@ bool verify(const EigenProblem& p, ShiftedFactor& shifted, const EigenOptions& o
     sturm_check(p, shifted.flops(), s, expected);
   }
   trim(pairs, residual, options.whole_groups ? expected : wanted);
-  s.verify_seconds = seconds_since(start);
+  s.verify_seconds = start.seconds();
   return true;
 }
 

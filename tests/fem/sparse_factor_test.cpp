@@ -38,7 +38,6 @@ TEST(SparseFactor, SolvesBlocksLikeTheDenseOracle) {
     }
     EXPECT_EQ(factor.negative_pivots(), 0);
     EXPECT_GE(factor.nonzeros(), K.nonZeros());
-    EXPECT_GT(factor.rcond_estimate(), 0);
     EXPECT_GE(factor.summary().bytes, 8.0 * static_cast<double>(factor.nonzeros()));
   }
 }
@@ -103,7 +102,6 @@ TEST(SparseFactor, NotANumberIsANumericalErrorOfEveryKind) {
     SparseMatrix broken = K;
     broken.coeffRef(K.rows() / 2, K.rows() / 2) = NAN;
     EXPECT_THROW(factor.factorise(broken), NumericalError);
-    EXPECT_EQ(input_error([&] { factor.rcond_estimate(); }), "condition: nothing is factorised");
   }
 }
 
