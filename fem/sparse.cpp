@@ -5,43 +5,71 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <vector>
 
 namespace flexboom {
 namespace {
 
 using Eigen::Index;
-using RowMajorBlock = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Y += A X for `width` columns kept row by row, so that an entry of A meets a run of neighbours.
-template <int width>
-void accumulate(const SparseMatrix& A, const double* X, double* Y) {
-  using Row = Eigen::Map<const Eigen::Array<double, width, 1>>;
-  using MutableRow = Eigen::Map<Eigen::Array<double, width, 1>>;
-  for (Index j = 0; j < A.cols(); ++j) {
-    const Row x_j(X + j * width);
-    Eigen::Array<double, width, 1> sum = Eigen::Array<double, width, 1>::Zero();
-    for (SparseMatrix::InnerIterator it(A, j); it; ++it) {
-      const Index i = it.row();
+// One version of a function for each generation of processors, chosen when the program starts. Not under sanitizers,
+// which are not ready that early.
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__)
+#define FLEXBOOM_FOR_EACH_PROCESSOR [[gnu::target_clones("avx512f", "avx2", "default")]]
+#else
+#define FLEXBOOM_FOR_EACH_PROCESSOR
+#endif
+
+/// A compressed matrix as plain arrays.
+struct Columns {
+  Index count;
+  const int* start;
+  const int* row;
+  const double* value;
+};
+
+// Columns side by side: a vector register, or as many as the processor needs for it.
+struct alignas(64) Eight {
+  static constexpr int width = 8;
+  double of [[gnu::vector_size(64)]];
+};
+struct alignas(32) Four {
+  static constexpr int width = 4;
+  double of [[gnu::vector_size(32)]];
+};
+
+/// Y += A X for a few columns kept row by row, so that an entry of A meets a run of neighbours.
+template <class Row>
+[[gnu::always_inline]] inline void accumulate(const Columns& A, const Row* x, Row* y) {
+  for (Index j = 0; j < A.count; ++j) {
+    const Row x_j = x[j];
+    Row sum = y[j];
+    for (int k = A.start[j]; k < A.start[j + 1]; ++k) {
+      const Index i = A.row[k];
       if (i < j) continue;
-      const double a = it.value();
-      if (i == j) {
-        sum += a * x_j;
-      } else {
-        sum += a * Row(X + i * width);
-        MutableRow(Y + i * width) += a * x_j;
-      }
+      sum.of += A.value[k] * x[i].of;
+      if (i != j) y[i].of += A.value[k] * x_j.of;
     }
-    MutableRow(Y + j * width) += sum;
+    y[j] = sum;
   }
 }
 
-template <int width>
-void product_of_columns(const SparseMatrix& A, const Eigen::Ref<const Eigen::MatrixXd>& X, Index first,
+FLEXBOOM_FOR_EACH_PROCESSOR void add_product(const Columns& A, const Eight* x, Eight* y) { accumulate(A, x, y); }
+
+FLEXBOOM_FOR_EACH_PROCESSOR void add_product(const Columns& A, const Four* x, Four* y) { accumulate(A, x, y); }
+
+template <class Row>
+void product_of_columns(const Columns& A, const Eigen::Ref<const Eigen::MatrixXd>& X, Index first,
                         Eigen::Ref<Eigen::MatrixXd> Y) {
-  const RowMajorBlock x = X.middleCols(first, width);
-  RowMajorBlock y = RowMajorBlock::Zero(X.rows(), width);
-  accumulate<width>(A, x.data(), y.data());
-  Y.middleCols(first, width) = y;
+  const auto rows = static_cast<size_t>(A.count);
+  std::vector<Row> x(rows), y(rows, Row{});
+  for (int c = 0; c < Row::width; ++c) {
+    for (size_t i = 0; i < rows; ++i) x[i].of[c] = X(static_cast<Index>(i), first + c);
+  }
+  add_product(A, x.data(), y.data());
+  for (int c = 0; c < Row::width; ++c) {
+    for (size_t i = 0; i < rows; ++i) Y(static_cast<Index>(i), first + c) = y[i].of[c];
+  }
 }
 
 }  // namespace
@@ -50,10 +78,12 @@ void symmetric_product(const SparseMatrix& A, const Eigen::Ref<const Eigen::Matr
                        Eigen::Ref<Eigen::MatrixXd> Y) {
   require(A.rows() == A.cols() && A.cols() == X.rows() && Y.rows() == X.rows() && Y.cols() == X.cols(),
           fmt::format("product: a {} x {} matrix with a {} x {} block", A.rows(), A.cols(), X.rows(), X.cols()));
+  require(A.isCompressed(), "product: the matrix must be compressed");
+  const Columns columns{A.cols(), A.outerIndexPtr(), A.innerIndexPtr(), A.valuePtr()};
   Index done = 0;
-  for (; done + 8 <= X.cols(); done += 8) product_of_columns<8>(A, X, done, Y);
-  for (; done + 4 <= X.cols(); done += 4) product_of_columns<4>(A, X, done, Y);
-  for (; done < X.cols(); ++done) product_of_columns<1>(A, X, done, Y);
+  for (; done + 8 <= X.cols(); done += 8) product_of_columns<Eight>(columns, X, done, Y);
+  for (; done + 4 <= X.cols(); done += 4) product_of_columns<Four>(columns, X, done, Y);
+  for (; done < X.cols(); ++done) Y.col(done) = A.selfadjointView<Eigen::Lower>() * X.col(done);
 }
 
 Eigen::MatrixXd symmetric_product(const SparseMatrix& A, const Eigen::Ref<const Eigen::MatrixXd>& X) {

@@ -7,6 +7,9 @@
 
 #include <cholmod.h>
 #include <fmt/format.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <algorithm>
 #include <cmath>
@@ -88,19 +91,26 @@ void check_status(const cholmod_common& common, const char* what) {
   throw NumericalError(fmt::format("{}: {} (CHOLMOD status {})", what, reason, common.status));
 }
 
+/// What an analysis and a factorisation used and freed goes back to the system: before the factor, the largest block of
+/// all, is made, and before the vectors that are solved for.
+void return_free_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
+
 }  // namespace
 
 // `common`, the factor and the blocks kept for solves, freed together.
 struct SparseFactor::Impl {
   cholmod_common common{};
   cholmod_factor* L = nullptr;
-  cholmod_dense* Y = nullptr;
-  cholmod_dense* E = nullptr;
   FactorKind kind;
   Eigen::Index size = 0;
   Eigen::Index entries = 0;
-  std::vector<int> place;         // of each unknown in the factor
-  Eigen::MatrixXd right, result;  // of a solve, in the order of the factor
+  std::vector<int> place;  // of each unknown in the factor
+  Eigen::MatrixXd permuted,
+      work;  // of a solve: unknowns in the order of the factor, and what CHOLMOD needs beside them
   bool factorised = false;
   FactorSummary summary;
 
@@ -111,18 +121,11 @@ struct SparseFactor::Impl {
     const bool definite = kind == FactorKind::definite;
     common.supernodal = definite ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL;
     common.final_ll = definite;
-    // Columns are merged to wider blocks than CHOLMOD's 4, 16, 48: the orders of slender bodies make narrow ones. A
-    // quarter of the time at 35 000 unknowns, for a tenth more memory.
-    common.nrelax[0] = 16;
-    common.nrelax[1] = 64;
-    common.nrelax[2] = 200;
     common.nmethods = 1;
     common.method[0].ordering = CHOLMOD_NATURAL;  // what it gets is permuted
     common.postorder = 0;
   }
   ~Impl() {
-    cholmod_free_dense(&E, &common);
-    cholmod_free_dense(&Y, &common);
     cholmod_free_factor(&L, &common);
     cholmod_finish(&common);
   }
@@ -146,22 +149,32 @@ struct SparseFactor::Impl {
     }
   }
 
-  // CHOLMOD fills a result block that is large enough in place.
   void solve(const Eigen::Ref<const Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd> X) {
-    right.resize(B.rows(), B.cols());
-    result.resize(B.rows(), B.cols());
+    permuted.resize(B.rows(), B.cols());
     for (Eigen::Index c = 0; c < B.cols(); ++c) {
-      for (Eigen::Index i = 0; i < size; ++i) right(place[static_cast<size_t>(i)], c) = B(i, c);
+      for (Eigen::Index i = 0; i < size; ++i) permuted(place[static_cast<size_t>(i)], c) = B(i, c);
     }
-    cholmod_dense rhs = view(right), x = view(result);
-    cholmod_dense* filled = &x;
-    const int solved = cholmod_solve2(CHOLMOD_A, L, &rhs, nullptr, &filled, nullptr, &Y, &E, &common);
+    L->is_super ? solve_in_blocks() : solve_by_columns();
     check_status(common, "sparse solve");
-    if (!solved || filled != &x || x.x != result.data())
-      throw NumericalError("sparse solve: CHOLMOD did not fill the result");
     for (Eigen::Index c = 0; c < B.cols(); ++c) {
-      for (Eigen::Index i = 0; i < size; ++i) X(i, c) = result(place[static_cast<size_t>(i)], c);
+      for (Eigen::Index i = 0; i < size; ++i) X(i, c) = permuted(place[static_cast<size_t>(i)], c);
     }
+  }
+
+  // L L^T, in place.
+  void solve_in_blocks() {
+    work.resize(permuted.cols(), static_cast<Eigen::Index>(L->maxesize));
+    cholmod_dense x = view(permuted), e = view(work);
+    cholmod_super_lsolve(L, &x, &e, &common);
+    cholmod_super_ltsolve(L, &x, &e, &common);
+  }
+
+  void solve_by_columns() {
+    cholmod_dense x = view(permuted);
+    cholmod_dense* solution = cholmod_solve(CHOLMOD_A, L, &x, &common);
+    if (solution == nullptr) return;
+    std::copy_n(static_cast<const double*>(solution->x), permuted.size(), permuted.data());
+    cholmod_free_dense(&solution, &common);
   }
 
   void require_definite() const {
@@ -203,9 +216,13 @@ void SparseFactor::factorise(const SparseMatrix& A) {
   impl_->factorised = false;
   const Stopwatch start;
   const WithoutOpenMP alone;
-  PermutedMatrix permuted(A, impl_->place, true);
-  cholmod_sparse a = permuted.view();
-  cholmod_factorize(&a, impl_->L, &impl_->common);
+  {
+    PermutedMatrix permuted(A, impl_->place, true);
+    cholmod_sparse a = permuted.view();
+    return_free_memory();
+    cholmod_factorize(&a, impl_->L, &impl_->common);
+  }
+  return_free_memory();
   if (impl_->common.status == CHOLMOD_NOT_POSDEF && impl_->kind == FactorKind::definite) impl_->require_definite();
   check_status(impl_->common, "sparse factorisation");
   impl_->check_pivots();

@@ -17,6 +17,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double independent = 1e-4;  // eigenvalues of a Gram matrix (unit diagonal) above this: digits lost below 100
+constexpr double unchanged = 1e-13;   // M W of a block that changed by less is good for another round
 constexpr int max_rounds = 6;         // each takes directions 100 times shorter than the one before
 
 /// M-norms of columns, given M W.
@@ -50,10 +51,10 @@ MatrixXd random_block(Index n, Index columns, std::uint64_t seed) {
   return block;
 }
 
-MassBasis::MassBasis(const SparseMatrix& M, Index capacity) : M_(M), V_(M.rows(), capacity), P_(M.rows(), capacity) {}
+MassBasis::MassBasis(const SparseMatrix& M, Index capacity) : M_(M), V_(M.rows(), capacity) {}
 
-MatrixXd MassBasis::project_out(MatrixXd& W) const {
-  MatrixXd coefficients = transposed_product(P_.leftCols(size_), W);
+MatrixXd MassBasis::project_out(MatrixXd& W, const MatrixXd& M_W) const {
+  MatrixXd coefficients = transposed_product(V_.leftCols(size_), M_W);
   add_product(W, -1, Transposed::no, V_.leftCols(size_), coefficients);
   return coefficients;
 }
@@ -62,21 +63,25 @@ MatrixXd MassBasis::append(MatrixXd W, double negligible) {
   const Index before = size_;
   const Index room = std::min(before + W.cols(), capacity());
   MatrixXd all = MatrixXd::Zero(room, W.cols());
-  all.topRows(before) = project_out(W);
+  all.topRows(before) = project_out(W, symmetric_product(M_, W));
   double cut = -1;
   for (int round = 0; round < max_rounds && size_ < room; ++round) {
-    all.topRows(size_) += project_out(W);  // twice is enough (Parlett 6.9)
-    const MatrixXd M_W = symmetric_product(M_, W);
-    const VectorXd left = norms(W, M_W);
+    MatrixXd M_W = symmetric_product(M_, W);
+    const MatrixXd more = project_out(W, M_W);  // twice is enough (Parlett 6.9)
+    all.topRows(size_) += more;
+    VectorXd left = norms(W, M_W);
+    if (!(more.colwise().norm().transpose().array() <= unchanged * left.array()).all()) {
+      M_W = symmetric_product(M_, W);
+      left = norms(W, M_W);
+    }
     if (cut < 0) cut = negligible * (left.cwiseAbs2() + all.colwise().squaredNorm().transpose()).cwiseSqrt().maxCoeff();
     const MatrixXd G = transposed_product(W, M_W);
     const MatrixXd X = well_apart((G + G.transpose()) / 2, cut);
     const Index added = std::min(X.cols(), room - size_);
     if (added == 0) break;
     auto Q = V_.middleCols(size_, added);
-    auto P = P_.middleCols(size_, added);
     Q = product(W, X.rightCols(added));
-    P = product(M_W, X.rightCols(added));
+    MatrixXd P = product(M_W, X.rightCols(added));
     const Eigen::LLT<MatrixXd> polish(transposed_product(Q, P));
     polish.matrixU().solveInPlace<Eigen::OnTheRight>(Q);
     polish.matrixU().solveInPlace<Eigen::OnTheRight>(P);
@@ -91,17 +96,15 @@ MatrixXd MassBasis::append(MatrixXd W, double negligible) {
 
 void MassBasis::rotate(const MatrixXd& S) {
   const Index tail = size_ - S.rows();
-  for (MatrixXd* X : {&V_, &P_}) {
-    // By slices of rows, so that the copy stays small.
-    constexpr Index slice = 512;
-    MatrixXd rows;
-    for (Index first = 0; first < X->rows(); first += slice) {
-      const Index height = std::min(slice, X->rows() - first);
-      rows.noalias() = X->block(first, 0, height, S.rows()) * S;
-      const MatrixXd rest = X->block(first, S.rows(), height, tail);
-      X->block(first, 0, height, S.cols()) = rows;
-      X->block(first, S.cols(), height, tail) = rest;
-    }
+  // By slices of rows, so that the copy stays small.
+  constexpr Index slice = 512;
+  MatrixXd rows;
+  for (Index first = 0; first < V_.rows(); first += slice) {
+    const Index height = std::min(slice, V_.rows() - first);
+    rows.noalias() = V_.block(first, 0, height, S.rows()) * S;
+    const MatrixXd rest = V_.block(first, S.rows(), height, tail);
+    V_.block(first, 0, height, S.cols()) = rows;
+    V_.block(first, S.cols(), height, tail) = rest;
   }
   size_ = S.cols() + tail;
 }

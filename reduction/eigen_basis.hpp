@@ -11,20 +11,19 @@ namespace flexboom {
 /// n x columns numbers in (-0.5, 0.5), the same every time for a seed, so that runs repeat to the last digit.
 Eigen::MatrixXd random_block(Eigen::Index n, Eigen::Index columns, std::uint64_t seed);
 
-/// An M-orthonormal basis that grows by blocks, with M times the basis beside it so that an inner product costs no
-/// product with M.
+/// An M-orthonormal basis that grows by blocks. M times the basis is not kept: a product with M costs less than the
+/// memory.
 class MassBasis {
  public:
   MassBasis(const SparseMatrix& M, Eigen::Index capacity);
 
   Eigen::Index size() const { return size_; }
   Eigen::Index capacity() const { return V_.cols(); }
-  auto vectors() const { return V_.leftCols(size_); }                                        // n x size
-  auto vectors(Eigen::Index first) const { return V_.middleCols(first, size_ - first); }     // n x (size - first)
-  auto mass_times(Eigen::Index first) const { return P_.middleCols(first, size_ - first); }  // M times these
+  auto vectors() const { return V_.leftCols(size_); }                                     // n x size
+  auto vectors(Eigen::Index first) const { return V_.middleCols(first, size_ - first); }  // n x (size - first)
 
   /// What is left of W outside the basis, and the coefficients of what was inside (size x columns of W).
-  Eigen::MatrixXd project_out(Eigen::MatrixXd& W) const;
+  Eigen::MatrixXd project_out(Eigen::MatrixXd& W, const Eigen::MatrixXd& M_W) const;
 
   /// Appends an orthonormal basis Q of what the columns of W have outside the basis, directions shorter than
   /// `negligible` (in the M norm) left out. Returns the coefficients of W in the basis as it is then:
@@ -41,7 +40,6 @@ class MassBasis {
  private:
   const SparseMatrix& M_;
   Eigen::MatrixXd V_;  // n x capacity
-  Eigen::MatrixXd P_;  // M V
   Eigen::Index size_ = 0;
 };
 

@@ -124,7 +124,7 @@ class BlockLanczos {
     const Index old = expanded_;
     const Index size = basis_.size();
     const Index width = size - old;
-    const MatrixXd coefficients = basis_.append(solve(basis_.mass_times(old)), negligible);
+    const MatrixXd coefficients = basis_.append(solve(symmetric_product(p_.M, basis_.vectors(old))), negligible);
     T_.block(0, old, size, width) = coefficients.topRows(size);
     T_.block(old, 0, width, old) = coefficients.topRows(old).transpose();
     T_.block(old, old, width, width) =
