@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace flexboom {
 
@@ -56,6 +57,31 @@ struct MeshArguments {
   std::filesystem::path file;
 };
 
+struct ReduceArguments {
+  std::string model;
+  ModelOptions options;
+  std::filesystem::path file;
+  std::string basis = "clamped";  // "clamped", "mean-axis", "craig-bampton", "hinge"
+  std::optional<int> count;
+  std::optional<std::string> backend;
+  std::vector<std::string> interfaces;  // "SET" or "SET:distributing"
+  std::string reference;                // interface that carries the body's frame
+  bool orthonormal = false;
+  std::vector<std::string> attachments;  // "SET.Fy"
+  std::vector<double> hinge_stiffness;   // [N m/rad]
+  std::vector<double> hinge_axis = {0, 0, 1};
+  std::optional<std::string> select;   // "list:1,3", "band:0,500", "mass:0.9", "completeness:0.9", "output:tip.uy,0.01"
+  std::optional<std::string> damping;  // "modal:0.005", "loss-factor:0.01", "rayleigh:ALPHA,BETA", "none"
+  bool stiffening = true;
+};
+
+struct ExportArguments {
+  std::filesystem::path body;
+  std::string format;
+  std::filesystem::path path;
+  std::vector<std::string> settings;  // "name=value"
+};
+
 struct BenchArguments {
   std::string what;
   double longest = 60;  // [s] per row; larger models are left out
@@ -74,6 +100,9 @@ int run_command(const RunArguments&, const CommonOptions&);
 int check_command(const std::string& scene, const CommonOptions&);
 int modes_command(const ModesArguments&, const CommonOptions&);
 int mesh_command(const MeshArguments&, const CommonOptions&);
+int reduce_command(const ReduceArguments&, const CommonOptions&);
+int inspect_command(const std::filesystem::path& body, const CommonOptions&);
+int export_command(const ExportArguments&, const CommonOptions&);
 int bench_command(const BenchArguments&, const CommonOptions&);
 int compare_command(const CompareArguments&, const CommonOptions&);
 int report_command(const std::filesystem::path& folder, const CommonOptions&);

@@ -2,6 +2,7 @@
 #include "apps/version.hpp"
 #include "fem/blas_threads.hpp"
 #include "fem/check.hpp"
+#include "reduction/exports.hpp"
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -26,6 +27,9 @@ struct CommandLine {
   RunArguments run;
   ModesArguments modes;
   MeshArguments mesh;
+  ReduceArguments reduce;
+  ExportArguments exported;
+  std::filesystem::path inspected;
   BenchArguments bench;
   CompareArguments compare;
   std::string checked;
@@ -38,6 +42,9 @@ struct CommandLine {
     add_check();
     add_modes();
     add_mesh();
+    add_reduce();
+    add_inspect();
+    add_export();
     add_bench();
     add_compare();
     add_report();
@@ -96,6 +103,56 @@ struct CommandLine {
     c->add_option("-o,--output", mesh.file, "Mesh to write: .vtu, .msh or .inp")->required();
     add_model_options(c, mesh.options);
     c->callback([this] { action = [this] { return mesh_command(mesh, common); }; });
+  }
+
+  void add_reduce() {
+    CLI::App* c = command("reduce", "mesh -> reduced body: basis, shapes, invariants, stiffening, certificate");
+    c->add_option("BODY", reduce.model, "Body file (.toml) or mesh (.inp, .msh, .bdf, .vtu, .step, .geo)")->required();
+    c->add_option("-o,--output", reduce.file, "Body to write (.h5)")->required();
+    c->add_option("--basis", reduce.basis, "clamped, mean-axis, craig-bampton or hinge")
+        ->check(CLI::IsMember({"clamped", "mean-axis", "craig-bampton", "hinge"}));
+    c->add_option("--count", reduce.count, "Modes (default: what the file asks for, or 10; of a hinge per stiffness)");
+    c->add_option("--backend", reduce.backend, "Eigen-solver: auto, arpack, block, spectra or dense");
+    c->add_option("--clamp", reduce.options.clamp,
+                  "Node set that is fixed (default: the body's, or the file's supports)");
+    c->add_option("--interface", reduce.interfaces,
+                  "Of craig-bampton: node set with coordinates of its own; SET:distributing for an RBE3 (repeatable)");
+    c->add_option("--reference", reduce.reference, "Of craig-bampton: the interface that carries the body's frame");
+    c->add_flag("--orthonormal", reduce.orthonormal, "Of craig-bampton: modes of the reduced body as coordinates");
+    c->add_option("--attach", reduce.attachments, "Static correction for a load, SET.Fx ... SET.Mz (repeatable)");
+    c->add_option("--hinge-stiffness", reduce.hinge_stiffness, "Of hinge: stiffness of each regime [N m/rad]")
+        ->delimiter(',');
+    c->add_option("--hinge-axis", reduce.hinge_axis, "Of hinge: axis through the origin, x,y,z (default 0,0,1)")
+        ->delimiter(',')
+        ->expected(3);
+    c->add_option("--select", reduce.select,
+                  "Coordinates to keep: list:1,3 band:LOW,HIGH (Hz) mass:SHARE completeness:SHARE output:SET.uy,SHARE");
+    c->add_option("--damping", reduce.damping,
+                  "none, modal:ZETA, loss-factor:ETA or rayleigh:ALPHA,BETA (default: the file's)");
+    c->add_flag("!--no-stiffening", reduce.stiffening, "Leave geometric stiffness out");
+    add_model_options(c, reduce.options);
+    c->callback([this] { action = [this] { return reduce_command(reduce, common); }; });
+  }
+
+  void add_inspect() {
+    CLI::App* c = command("inspect", "Prints mass properties, coordinate table and checks of a reduced body");
+    c->add_option("FILE", inspected, "Reduced body (.h5)")->required();
+    c->callback([this] { action = [this] { return inspect_command(inspected, common); }; });
+  }
+
+  void add_export() {
+    CLI::App* c = command("export", "Reduced body in another program's format");
+    c->add_option("FILE", exported.body, "Reduced body (.h5)")->required();
+    c->add_option("--to", exported.format, "Format: " + export_formats())->required();
+    c->add_option("-o,--output", exported.path, "File or folder to write")->required();
+    c->add_option("--set", exported.settings, "Setting of the format, NAME=VALUE (repeatable)");
+    c->callback([this] { action = [this] { return export_command(exported, common); }; });
+  }
+
+  static std::string export_formats() {
+    std::string names;
+    for (const Exporter& e : exporters()) names += (names.empty() ? "" : ", ") + std::string(e.name);
+    return names;
   }
 
   void add_bench() {

@@ -29,6 +29,7 @@ Model body_model(const std::filesystem::path& path, const ModelOptions& options)
   model.name = body.name;
   model.mesh = solid ? make_solid_mesh(body.geometry, body.solid) : make_mesh(body.geometry);
   model.backend = body.backend;
+  model.damping = body.damping;
   if (body.structure == "eq14")
     model.notes.push_back(
         "modes solves finite elements; the closed form of structure = \"eq14\" is in `flexboom compare`");

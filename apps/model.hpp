@@ -1,6 +1,7 @@
 #pragma once
 
 #include "fem/constraints.hpp"
+#include "reduction/reduced_body.hpp"
 
 #include <filesystem>
 #include <optional>
@@ -28,6 +29,7 @@ struct Model {
   std::optional<int> modes;            // number of modes that the file asks for
   std::vector<std::string> notes;      // what was read as something else, and what is most likely a mistake
   std::optional<std::string> backend;  // eigen-solver that the file asks for
+  DampingRule damping;                 // none of mesh files
 };
 
 /// @throws InputError naming the file and the place in it, a set that it lacks, or an option that does not apply to it.

@@ -84,7 +84,7 @@ ordered_json bodies_json(const RunResult& r) {
 ordered_json checks_json(const RunResult& r) {
   ordered_json checks = ordered_json::array();
   for (const PreparedBody& p : r.bodies)
-    for (const InvariantCheck& c : p.checks)
+    for (const BodyCheck& c : p.checks)
       checks.push_back({{"name", p.body.name + "." + c.name},
                         {"value", c.value},
                         {"reference", c.reference},

@@ -23,8 +23,8 @@ struct BodyScene {
   bool modes_auto = false;                 // modes = "auto": chosen from the accuracy wanted
   std::string directions = "hinge-plane";  // modes that count: "hinge-plane" (bending along y) or "all"
   BeamGeometry geometry;
-  SolidOptions solid;              // [solid], how structure = "solid" is meshed
-  DampingRule damping;             // none by default
+  SolidOptions solid;            // [solid], how structure = "solid" is meshed
+  DampingRule damping;           // none by default
   std::string backend = "auto";  // eigen-solver: ARPACK for beams, blocks for large solids
 };
 

@@ -76,7 +76,7 @@ PreparedBody prepare_body(const BodyScene& b, int refine) {
       fmt::format("body {}: structure '{}' is not available; there are: 'beam', 'eq14', 'rigid'", b.name, b.structure));
   PreparedBody r = b.structure == "eq14" ? prepare_eq14(b) : prepare_beam(b, refine);
   apply_damping(r.body, b.damping);
-  for (const InvariantCheck& c : r.checks)
+  for (const BodyCheck& c : r.checks)
     if (!c.passed)
       throw NumericalError(fmt::format("body {}: invariant {} = {:.17g}, but {:.17g} by an independent route", b.name,
                                        c.name, c.value, c.reference));

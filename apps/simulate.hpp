@@ -15,8 +15,8 @@ namespace flexboom {
 struct PreparedBody {
   ReducedBody body;
   int elements = 0;
-  int dofs = 0;                        // unknowns of the model, 0 in closed form
-  std::vector<InvariantCheck> checks;  // empty in closed form
+  int dofs = 0;                   // unknowns of the model, 0 in closed form
+  std::vector<BodyCheck> checks;  // empty in closed form
   EigenSummary eigen;
 };
 

@@ -1,15 +1,12 @@
 #pragma once
 
+#include "reduction/tilde.hpp"
+
 #include <Eigen/Geometry>
 
 #include <cmath>
 
 namespace flexboom {
-
-/// Cross-product matrix: tilde(a) b = a x b.
-inline Eigen::Matrix3d tilde(const Eigen::Vector3d& a) {
-  return Eigen::Matrix3d{{0, -a.z(), a.y()}, {a.z(), 0, -a.x()}, {-a.y(), a.x(), 0}};
-}
 
 /// Rotation vector [rad] of a unit quaternion (w, x, y, z), angle in [0, pi]; exact for small angles.
 inline Eigen::Vector3d rotation_vector(const Eigen::Vector4d& q) {

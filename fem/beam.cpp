@@ -195,6 +195,78 @@ VectorXd rigidities(const BeamProperty& property, const Section& s) {
   return D;
 }
 
+// What second-order strains are made of, in element axes: rows over the columns of q.
+struct Slopes {
+  MatrixXd theta;   // 3 x k
+  MatrixXd strain;  // 6 x k: rows of LocalRows::strain
+};
+
+Slopes slopes_at(const Frame& frame, int p, bool with_shear, double xi, const Eigen::Ref<const MatrixXd>& q) {
+  LocalRows rows = local_rows(p, with_shear, xi, frame.length);
+  rotate_node_columns(rows.motion, frame.A_ME);
+  rotate_node_columns(rows.strain, frame.A_ME);
+  return {rows.motion.bottomRows<3>() * q, rows.strain * q};
+}
+
+// Adds the second variation of factor * a b, for all pairs of columns.
+template <class A, class B>
+void add_pairs(Eigen::Ref<VectorXd> pairs, double factor, const A& a, const B& b) {
+  const Index count = a.size();
+  for (Index k = 0, first = 0; k < count; first += count - k, ++k) {
+    pairs.segment(first, count - k) += factor * (a(k) * b.tail(count - k) + b(k) * a.tail(count - k)).transpose();
+  }
+}
+
+// Second-order strains that the resultants N, Qy, Qz, T, My, Mz work on: columns, pairs x 6. U = N (v'^2 + w'^2 +
+// Ip/A theta_x'^2) / 2 + Qy (w' theta_x + theta_x theta_y / 2) + Qz (-v' theta_x + theta_x theta_z / 2)
+// - M . (theta x theta') / 2.
+MatrixXd second_order(const Slopes& s, double polar) {
+  const auto x = s.theta.row(0), y = s.theta.row(1), z = s.theta.row(2);
+  const auto dx = s.strain.row(3), dy = s.strain.row(4), dz = s.strain.row(5);
+  const VectorXd dv = (s.strain.row(1) + z).transpose(), dw = (s.strain.row(2) - y).transpose();
+  MatrixXd pairs = MatrixXd::Zero(x.size() * (x.size() + 1) / 2, 6);
+  add_pairs(pairs.col(0), 0.5, dv.transpose(), dv.transpose());
+  add_pairs(pairs.col(0), 0.5, dw.transpose(), dw.transpose());
+  add_pairs(pairs.col(0), 0.5 * polar, dx, dx);
+  add_pairs(pairs.col(1), 1, dw.transpose(), x);
+  add_pairs(pairs.col(1), 0.5, x, y);
+  add_pairs(pairs.col(2), -1, dv.transpose(), x);
+  add_pairs(pairs.col(2), 0.5, x, z);
+  add_pairs(pairs.col(3), -0.5, y, dz);
+  add_pairs(pairs.col(3), 0.5, z, dy);
+  add_pairs(pairs.col(4), -0.5, z, dx);
+  add_pairs(pairs.col(4), 0.5, x, dz);
+  add_pairs(pairs.col(5), -0.5, x, dy);
+  add_pairs(pairs.col(5), 0.5, y, dx);
+  return pairs;
+}
+
+// Without shear strain the shear forces are Qy = -Mz', Qz = My', and U has -Qy theta_x theta_y / 2 - Qz theta_x theta_z
+// / 2. Integrated by parts: the moments work on these derivatives inside the element, and at its ends.
+void add_shear_forces_inside(const Slopes& s, MatrixXd& pairs) {
+  const auto x = s.theta.row(0), y = s.theta.row(1), z = s.theta.row(2);
+  const auto dx = s.strain.row(3), dy = s.strain.row(4), dz = s.strain.row(5);
+  add_pairs(pairs.col(4), 0.5, dx, z);
+  add_pairs(pairs.col(4), 0.5, x, dz);
+  add_pairs(pairs.col(5), -0.5, dx, y);
+  add_pairs(pairs.col(5), -0.5, x, dy);
+}
+MatrixXd shear_forces_at_end(const Slopes& s) {
+  const Index k = s.theta.cols();
+  MatrixXd pairs = MatrixXd::Zero(k * (k + 1) / 2, 6);
+  add_pairs(pairs.col(4), -0.5, s.theta.row(0), s.theta.row(2));
+  add_pairs(pairs.col(5), 0.5, s.theta.row(0), s.theta.row(1));
+  return pairs;
+}
+
+// N, Qy, Qz, T, My, Mz of strains (6 x k); without shear strain the shear forces are zero here.
+MatrixXd resultants(const BeamProperty& property, const Section& s, const MatrixXd& strain) {
+  const double E = property.material.E, G = property.material.shear_modulus();
+  Eigen::Matrix<double, 6, 1> D;
+  D << E * s.A, s.kappa_y * G * s.A, s.kappa_z * G * s.A, G * s.J, E * s.Iy, E * s.Iz;
+  return D.asDiagonal() * strain;
+}
+
 const BeamProperty& property_of(const Mesh& mesh, const Element& element) {
   return mesh.beam_properties[static_cast<size_t>(element.property)];
 }
@@ -243,6 +315,32 @@ void mass_points(const Mesh& mesh, const Element& element, int extra, const Mass
       visit(dm / 4, centre + r, N);
     }
   }
+}
+
+MatrixXd prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
+                        const Eigen::Ref<const MatrixXd>& q) {
+  const BeamProperty& property = property_of(mesh, element);
+  const bool with_shear = has_shear(property);
+  const Frame frame = frame_of(mesh, element);
+  MatrixXd work = MatrixXd::Zero(q.cols() * (q.cols() + 1) / 2, q0.cols());
+  const auto resultants_at = [&](double xi, const Section& section) {
+    return resultants(property, section, slopes_at(frame, element.order, with_shear, xi, q0).strain);
+  };
+  const GaussRule& rule = gauss_rule(gauss_points(element.order) + taper_points);
+  for (Index g = 0; g < rule.points.size(); ++g) {
+    const double xi = rule.points(g);
+    const Section section = section_at(property, (1 + xi) / 2);
+    const Slopes slopes = slopes_at(frame, element.order, with_shear, xi, q);
+    MatrixXd pairs = second_order(slopes, (section.Iy + section.Iz) / section.A);
+    if (!with_shear) add_shear_forces_inside(slopes, pairs);
+    work.noalias() += rule.weights(g) * frame.length / 2 * (pairs * resultants_at(xi, section));
+  }
+  if (with_shear) return work;
+  for (const double end : {-1.0, 1.0}) {
+    const Slopes slopes = slopes_at(frame, element.order, with_shear, end, q);
+    work.noalias() += end * (shear_forces_at_end(slopes) * resultants_at(end, section_at(property, (1 + end) / 2)));
+  }
+  return work;
 }
 
 Matrix6X interpolation(const Mesh& mesh, const Element& element, const Vector3d& at) {

@@ -96,8 +96,12 @@ void add_distributing(std::vector<ConstraintRow>& rows, const Mesh& mesh, const 
 /// Gaussian elimination on sparse rows. A pivot is expressed by freedoms that no earlier pivot is among.
 class Elimination {
  public:
-  Elimination(int freedoms, std::vector<char> held)
-      : held_(std::move(held)), pivot_row_(at(freedoms), -1), value_(at(freedoms), 0), listed_(at(freedoms), 0) {}
+  Elimination(int freedoms, std::vector<char> held, std::vector<char> independent)
+      : held_(std::move(held)),
+        independent_(std::move(independent)),
+        pivot_row_(at(freedoms), -1),
+        value_(at(freedoms), 0),
+        listed_(at(freedoms), 0) {}
 
   void add(const ConstraintRow& row) {
     for (const auto& [dof, coefficient] : row.terms) accumulate(dof, coefficient);
@@ -106,13 +110,15 @@ class Elimination {
     int strongest = -1;
     for (const auto& [dof, coefficient] : row.terms) original = std::max(original, std::abs(coefficient));
     for (const int dof : list_) {
-      if (std::abs(value_[at(dof)]) > largest) {
-        largest = std::abs(value_[at(dof)]);
+      largest = std::max(largest, std::abs(value_[at(dof)]));
+      if (!independent_[at(dof)] && (strongest < 0 || std::abs(value_[at(dof)]) > std::abs(value_[at(strongest)])))
         strongest = dof;
-      }
     }
     if (largest > 1e-11 * original) {  // below: redundant to round-off
-      const bool take_preferred = row.preferred >= 0 && std::abs(value_[at(row.preferred)]) > 1e-6 * largest;
+      require(strongest >= 0 && std::abs(value_[at(strongest)]) > 1e-9 * largest,
+              "connections tie freedoms to each other that are to be independent");
+      const bool take_preferred = row.preferred >= 0 && !independent_[at(row.preferred)] &&
+                                  std::abs(value_[at(row.preferred)]) > 1e-6 * largest;
       store(take_preferred ? row.preferred : strongest, 1e-14 * largest);
     }
     clear();
@@ -175,7 +181,7 @@ class Elimination {
     list_.clear();
   }
 
-  std::vector<char> held_;
+  std::vector<char> held_, independent_;
   std::vector<int> pivot_row_;  // of each freedom, -1: none
   std::vector<std::vector<std::pair<int, double>>> rows_;
   std::vector<double> value_;  // the row at work
@@ -302,6 +308,12 @@ MatrixXd Unknowns::expanded(const Eigen::Ref<const MatrixXd>& X) const {
   return U;
 }
 
+MatrixXd Unknowns::reduced_loads(const Eigen::Ref<const MatrixXd>& F) const {
+  MatrixXd result = F(free_dofs(), Eigen::all);
+  if (!follower.empty()) result += follower_rows.transpose() * F(follower, Eigen::all);
+  return result;
+}
+
 std::vector<int> Unknowns::free_dofs() const {
   std::vector<int> free;
   for (size_t dof = 0; dof < of_freedom.size(); ++dof) {
@@ -337,9 +349,11 @@ int rigid_freedoms(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp) {
   return null_space(of_held) - null_space(of_all);
 }
 
-Unknowns unknowns(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp) {
+Unknowns unknowns(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp, const std::vector<int>& independent) {
   const std::vector<char> held = held_freedoms(mesh, dofs, clamp);
-  Elimination elimination(dofs.count, held);
+  std::vector<char> keep(held.size(), 0);
+  for (const int dof : independent) keep[at(dof)] = 1;
+  Elimination elimination(dofs.count, held, std::move(keep));
   for (const ConstraintRow& row : constraint_rows(mesh, dofs)) elimination.add(row);
 
   Unknowns result;

@@ -41,13 +41,17 @@ struct Unknowns {
   /// T X: full vectors (freedoms x k) from unknowns (count x k).
   Eigen::MatrixXd expanded(const Eigen::Ref<const Eigen::MatrixXd>& X) const;
 
+  /// T^T F: loads on the unknowns (count x k) of loads on all freedoms.
+  Eigen::MatrixXd reduced_loads(const Eigen::Ref<const Eigen::MatrixXd>& F) const;
+
   /// The freedoms that are unknowns, ascending.
   std::vector<int> free_dofs() const;
 };
 
 /// Eliminates the constraints by Gaussian elimination, the preferred freedom of each as its pivot where possible;
-/// redundant ones drop out. @throws InputError as constraint_rows, and when nothing is left.
-Unknowns unknowns(const Mesh&, const DofMap&, const Clamp&);
+/// redundant ones drop out. Freedoms that are `independent` never follow others.
+/// @throws InputError as constraint_rows, when nothing is left, and when independent freedoms are tied to each other.
+Unknowns unknowns(const Mesh&, const DofMap&, const Clamp&, const std::vector<int>& independent = {});
 
 /// How many of the six rigid motions of the whole mesh a clamp and the supports leave, 0 to 6.
 int rigid_freedoms(const Mesh&, const DofMap&, const Clamp&);

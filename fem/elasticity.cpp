@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 
 namespace flexboom::elasticity {
@@ -51,6 +52,57 @@ Matrix6X motion_rows(const Eigen::Ref<const Eigen::VectorXd>& values,
     rows.block<3, 3>(3, 3 * a) << 0, -z, y, z, 0, -x, -y, x, 0;
   }
   return rows;
+}
+
+namespace {
+
+// Second-order strains xx yy zz xy yz zx (engineering shear) of all pairs of vectors, pairs x 6. Slopes: k x 9, column
+// 3 i + m holds the slope of component m along x_i.
+void set_second_order(const Eigen::Matrix<double, Eigen::Dynamic, 9>& slopes, Eigen::Ref<MatrixXd> strains) {
+  const Index count = slopes.rows();
+  for (Index k = 0, first = 0; k < count; first += count - k, ++k) {
+    const Index rest = count - k;
+    for (Index i = 0; i < 3; ++i) {
+      const Index j = (i + 1) % 3;
+      const auto A = slopes.block(k, 3 * i, rest, 3), B = slopes.block(k, 3 * j, rest, 3);
+      strains.col(i).segment(first, rest).noalias() = A.col(0) * A(0, 0) + A.col(1) * A(0, 1) + A.col(2) * A(0, 2);
+      strains.col(3 + i).segment(first, rest).noalias() = A.col(0) * B(0, 0) + A.col(1) * B(0, 1) + A.col(2) * B(0, 2) +
+                                                          B.col(0) * A(0, 0) + B.col(1) * A(0, 1) + B.col(2) * A(0, 2);
+    }
+  }
+}
+
+Eigen::Matrix<double, 6, 1> stress(const Eigen::Matrix3d& gradient, const Lame& m) {
+  const Eigen::Matrix3d strain = gradient + gradient.transpose();
+  Eigen::Matrix<double, 6, 1> s;
+  s.head<3>() = m.mu * strain.diagonal().array() + m.lambda * gradient.trace();
+  s.tail<3>() = m.mu * Eigen::Vector3d(strain(0, 1), strain(1, 2), strain(2, 0));
+  return s;
+}
+
+}  // namespace
+
+MatrixXd prestress_work(const Eigen::VectorXd& volumes, const MatrixXd& gradients, Index modes, const Lame& lame) {
+  const Index loads = gradients.cols() / 3 - modes, pairs = modes * (modes + 1) / 2, points = volumes.size();
+  const Index block = std::max<Index>(1, 65536 / (6 * pairs + 1));  // points whose pairs are held at a time: 0.5 MB
+  MatrixXd work = MatrixXd::Zero(pairs, loads);
+  MatrixXd strains(pairs, 6 * std::min(block, points)), stresses(6 * std::min(block, points), loads);
+  Eigen::Matrix<double, Eigen::Dynamic, 9> slopes(modes, 9);
+  for (Index first = 0; first < points; first += block) {
+    const Index count = std::min(block, points - first);
+    for (Index p = 0; p < count; ++p) {
+      const auto rows = gradients.middleRows<3>(3 * (first + p));
+      for (Index k = 0; k < modes; ++k) {
+        for (Index i = 0; i < 3; ++i) slopes.block<1, 3>(k, 3 * i) = rows.block<1, 3>(i, 3 * k);
+      }
+      set_second_order(slopes, strains.middleCols(6 * p, 6));
+      for (Index c = 0; c < loads; ++c) {
+        stresses.block<6, 1>(6 * p, c) = volumes(first + p) * stress(rows.block<3, 3>(0, 3 * (modes + c)), lame);
+      }
+    }
+    work.noalias() += strains.leftCols(6 * count) * stresses.topRows(6 * count);
+  }
+  return work;
 }
 
 MatrixXd stiffness_from_gradients(const MatrixXd& H, const Lame& m) {

@@ -40,6 +40,12 @@ inline double energy_density(const Eigen::Matrix3d& gradient, const Lame& m) {
          m.mu / 2 * (shear_xy * shear_xy + shear_yz * shear_yz + shear_zx * shear_zx);
 }
 
+/// Prestress work (ElementType::prestress_work) of points of a volume. Rows 3 p + i of `gradients` belong to point p,
+/// column 3 c + m holds the slope of component m along x_i of vector c: the `modes` first, then the prestresses.
+/// Cauchy's stress of the prestress times Green's second-order strain: volume sigma_ij (du_k/dx_i . du_l/dx_j).
+Eigen::MatrixXd prestress_work(const Eigen::VectorXd& volumes, const Eigen::MatrixXd& gradients, Eigen::Index modes,
+                               const Lame&);
+
 /// Lower triangle of K over 3 n freedoms from the lower triangle of the sums H = sum w g g^T of gradients g stacked by
 /// component (3 n x 3 n): K_ab = lambda g_a g_b^T + mu g_b g_a^T + mu (g_a . g_b) I.
 Eigen::MatrixXd stiffness_from_gradients(const Eigen::MatrixXd& H, const Lame&);

@@ -84,6 +84,7 @@ constexpr ElementType beam_row(std::string_view name) {
           beam::interpolation,
           beam::position,
           energy_from_points<beam::strain_points>,
+          beam::prestress_work,
           beam::validate};
 }
 
@@ -103,6 +104,7 @@ constexpr ElementType solid_row(std::string_view name, Shape shape, int (*node_c
           Type::interpolation,
           Type::position,
           Strains::strain_energy,
+          Strains::prestress_work,
           Type::validate};
 }
 

@@ -25,6 +25,8 @@ constexpr std::array<int, max_hexahedron_order> all_orders = {1, 2, 3, 4, 5, 6, 
 
 // One more point per direction than polynomials: on curved elements K is then closer to exact than the shapes are.
 int stiffness_points(int p) { return p + 2; }
+// An error of order 2 p + 2, of the element 2 p; no motion depends on these points for its stiffness.
+int prestress_points(int p) { return p + 1; }
 // N N^T det J has degree 2 p + 3 p - 1 in each coordinate.
 int mass_points_per_direction(int p) { return (5 * p + 1) / 2; }
 
@@ -61,13 +63,14 @@ LineTable gauss_table(int order, int points) {
 }
 
 struct OrderTables {
-  LineTable stiffness, mass, nodes;
+  LineTable stiffness, prestress, mass, nodes;
   MatrixXd stiffness_pairs;  // 4 m x n^2: all pairs of the stiffness points, transposed and stacked
 };
 
 OrderTables make_order_tables(int order) {
   const LobattoBasis& basis = lobatto_basis(order);
   OrderTables tables{gauss_table(order, stiffness_points(order)),
+                     gauss_table(order, prestress_points(order)),
                      gauss_table(order, mass_points_per_direction(order)),
                      make_line_table(basis, basis.nodes(), VectorXd::Zero(basis.nodes().size())),
                      {}};
@@ -317,6 +320,24 @@ VectorXd Hexahedron::strain_energy(const Mesh& mesh, const Element& element, con
     }
   }
   return energy;
+}
+
+MatrixXd Hexahedron::prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
+                                    const Eigen::Ref<const MatrixXd>& q) {
+  const LineTable& line = order_tables(element.order).prestress;
+  const Metric at = metric(line, elasticity::local_positions(mesh, element));
+  MatrixXd fields(q.rows() / 3, 3 * (q.cols() + q0.cols()));
+  fields << fields_of(q), fields_of(q0);
+  const std::array<MatrixXd, 3> slopes = slopes_at_points(line, fields);
+  MatrixXd gradients(3 * at.volumes.size(), fields.cols());
+  for (Index p = 0; p < at.volumes.size(); ++p) {
+    const Matrix3d& G = at.G[static_cast<size_t>(p)];
+    for (Index i = 0; i < 3; ++i) {
+      gradients.row(3 * p + i) = G(0, i) * slopes[0].col(p) + G(1, i) * slopes[1].col(p) + G(2, i) * slopes[2].col(p);
+    }
+  }
+  return elasticity::prestress_work(at.volumes, gradients, q.cols(),
+                                    elasticity::lame(elasticity::material_of(mesh, element)));
 }
 
 void Hexahedron::validate(const Mesh& mesh, const Element& element) {

@@ -30,6 +30,7 @@ struct Recipe {
   ShapeFunctions (*shapes)(const Vector3d&);
   const Matrix3Xd& (*positions)();
   PointRule (*stiffness_rule)();
+  PointRule (*prestress_rule)();  // exact to the order of the element's own error; holds no motion
   PointRule (*mass_rule)(int extra);
 };
 
@@ -70,14 +71,15 @@ PointRule stabilised(const PointRule& reduced, const PointRule& full) {
 PointRule stabilised_cube() { return stabilised(hexahedron_rule(2), hexahedron_rule(3)); }
 PointRule stabilised_wedge() { return stabilised(wedge_rule(1, 2), wedge_rule(3, 2)); }
 
-constexpr std::array<Recipe, 8> recipes = {{{8, hex8_shapes, hexahedron_nodes, cube<2>, finer_cube<2>},
-                                            {20, hex20_shapes, hexahedron_nodes, cube<3>, finer_cube<3>},
-                                            {20, hex20_shapes, hexahedron_nodes, stabilised_cube, finer_cube<2>},
-                                            {27, hex27_shapes, hexahedron_nodes, cube<3>, finer_cube<4>},
-                                            {4, tet4_shapes, tetrahedron_nodes, tetrahedron<1>, finer_tetrahedron},
-                                            {10, tet10_shapes, tetrahedron_nodes, tetrahedron<4>, finer_tetrahedron},
-                                            {6, wedge6_shapes, wedge_nodes, stabilised_wedge, finer_wedge<6>},
-                                            {15, wedge15_shapes, wedge_nodes, wedge<3, 3>, finer_wedge<3>}}};
+constexpr std::array<Recipe, 8> recipes = {
+    {{8, hex8_shapes, hexahedron_nodes, cube<2>, cube<2>, finer_cube<2>},
+     {20, hex20_shapes, hexahedron_nodes, cube<3>, cube<2>, finer_cube<3>},
+     {20, hex20_shapes, hexahedron_nodes, stabilised_cube, cube<2>, finer_cube<2>},
+     {27, hex27_shapes, hexahedron_nodes, cube<3>, cube<2>, finer_cube<4>},
+     {4, tet4_shapes, tetrahedron_nodes, tetrahedron<1>, tetrahedron<1>, finer_tetrahedron},
+     {10, tet10_shapes, tetrahedron_nodes, tetrahedron<4>, tetrahedron<4>, finer_tetrahedron},
+     {6, wedge6_shapes, wedge_nodes, stabilised_wedge, wedge<1, 2>, finer_wedge<6>},
+     {15, wedge15_shapes, wedge_nodes, wedge<3, 3>, wedge<3, 2>, finer_wedge<3>}}};
 
 template <SolidKind kind>
 constexpr const Recipe& recipe = recipes[static_cast<size_t>(kind)];
@@ -105,6 +107,12 @@ Table make_table(const Recipe& recipe, const PointRule& rule) {
 template <SolidKind kind>
 const Table& stiffness_table() {
   static const Table table = make_table(recipe<kind>, recipe<kind>.stiffness_rule());
+  return table;
+}
+
+template <SolidKind kind>
+const Table& prestress_table() {
+  static const Table table = make_table(recipe<kind>, recipe<kind>.prestress_rule());
   return table;
 }
 
@@ -182,18 +190,22 @@ MatrixXd mass_of(const Table& table, const Mesh& mesh, const Element& element) {
   return elasticity::mass_from_scalar(m);
 }
 
+// Column 3 k + i: component i of vector k, less its value at the first node, which strains nothing.
+MatrixXd fields_of(const Eigen::Ref<const MatrixXd>& q) {
+  MatrixXd U(q.rows() / 3, 3 * q.cols());
+  for (Index k = 0; k < q.cols(); ++k) {
+    for (Index a = 0; a < U.rows(); ++a) {
+      U.block<1, 3>(a, 3 * k) = (q.col(k).segment<3>(3 * a) - q.col(k).head<3>()).transpose();
+    }
+  }
+  return U;
+}
+
 VectorXd energy_of(const Table& table, const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
   const MatrixX3d X = elasticity::local_positions(mesh, element);
   const Lame lame = elasticity::lame(elasticity::material_of(mesh, element));
   const MatrixX3d J = jacobians(table, X);
-  // Column 3 k + i: component i of vector k, less its value at the first node, which strains nothing.
-  MatrixXd U(X.rows(), 3 * q.cols());
-  for (Index k = 0; k < q.cols(); ++k) {
-    for (Index a = 0; a < X.rows(); ++a) {
-      U.block<1, 3>(a, 3 * k) = (q.col(k).segment<3>(3 * a) - q.col(k).head<3>()).transpose();
-    }
-  }
-  const MatrixXd R = table.rows * U;
+  const MatrixXd R = table.rows * fields_of(q);
   VectorXd energy = VectorXd::Zero(q.cols());
   for (Index p = 0; p < table.weights.size(); ++p) {
     const Matrix3d Jt = J.middleRows<3>(3 * p), inverse = Jt.inverse();
@@ -204,6 +216,22 @@ VectorXd energy_of(const Table& table, const Mesh& mesh, const Element& element,
     }
   }
   return energy;
+}
+
+MatrixXd prestress_work_of(const Table& table, const Mesh& mesh, const Element& element,
+                           const Eigen::Ref<const MatrixXd>& q0, const Eigen::Ref<const MatrixXd>& q) {
+  const MatrixX3d J = jacobians(table, elasticity::local_positions(mesh, element));
+  MatrixXd U(q.rows() / 3, 3 * (q.cols() + q0.cols()));
+  U << fields_of(q), fields_of(q0);
+  MatrixXd gradients = table.rows * U;
+  VectorXd volumes(table.weights.size());
+  for (Index p = 0; p < volumes.size(); ++p) {
+    const Matrix3d Jt = J.middleRows<3>(3 * p);
+    volumes(p) = table.weights(p) * Jt.determinant();
+    gradients.middleRows<3>(3 * p) = (Jt.inverse() * gradients.middleRows<3>(3 * p)).eval();
+  }
+  return elasticity::prestress_work(volumes, gradients, q.cols(),
+                                    elasticity::lame(elasticity::material_of(mesh, element)));
 }
 
 void visit_masses(const Table& table, const Mesh& mesh, const Element& element, const MassPointVisitor& visit) {
@@ -279,6 +307,12 @@ Vector3d Solid<kind>::position(const Mesh& mesh, const Element& element, const V
 template <SolidKind kind>
 VectorXd Solid<kind>::strain_energy(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
   return energy_of(stiffness_table<kind>(), mesh, element, q);
+}
+
+template <SolidKind kind>
+MatrixXd Solid<kind>::prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
+                                     const Eigen::Ref<const MatrixXd>& q) {
+  return prestress_work_of(prestress_table<kind>(), mesh, element, q0, q);
 }
 
 template <SolidKind kind>

@@ -138,6 +138,28 @@ Amplitudes amplitudes(const MatrixXd& K) {
   return -K_aa.llt().solve(K.bottomLeftCorner<enhanced, displacements>());
 }
 
+// Displacements of the corners and of the incompatible modes, amplitudes of the volumetric strains.
+struct Motion {
+  Eigen::Matrix<double, 3, 11> U;
+  Vector3d dilatation;
+};
+
+Motion motion_of(Eigen::Matrix<double, displacements, 1> u, const Amplitudes& A) {
+  u -= u.head<3>().eval().replicate<8, 1>();  // a translation strains nothing
+  const Eigen::Matrix<double, enhanced, 1> amplitude = A * u;
+  Motion motion;
+  motion.U << u.reshaped(3, 8), amplitude.head<9>().reshaped(3, 3);
+  motion.dilatation = amplitude.tail<3>();
+  return motion;
+}
+
+// (m, i): slope of component m along x_i.
+Matrix3d gradient_at(const Point& point, const Motion& motion) {
+  Matrix3d gradient = motion.U * point.gradients;
+  gradient.diagonal().array() += point.dilatation.dot(motion.dilatation);
+  return gradient;
+}
+
 Lame lame_of(const Mesh& mesh, const Element& element) {
   return elasticity::lame(elasticity::material_of(mesh, element));
 }
@@ -173,18 +195,30 @@ VectorXd Hex8<strain>::strain_energy(const Mesh& mesh, const Element& element, c
   const Amplitudes A = amplitudes(complete_stiffness(points, lame));
   VectorXd energy = VectorXd::Zero(q.cols());
   for (Index k = 0; k < q.cols(); ++k) {
-    Eigen::Matrix<double, displacements, 1> u = q.col(k);
-    u -= u.head<3>().eval().replicate<8, 1>();  // a translation strains nothing
-    const Eigen::Matrix<double, enhanced, 1> amplitude = A * u;
-    Eigen::Matrix<double, 3, 11> U;
-    U << u.reshaped(3, 8), amplitude.head<9>().reshaped(3, 3);
+    const Motion motion = motion_of(q.col(k), A);
     for (const Point& point : points) {
-      Matrix3d gradient = U * point.gradients;
-      gradient.diagonal().array() += point.dilatation.dot(amplitude.tail<3>());
-      energy(k) += point.volume * elasticity::energy_density(gradient, lame);
+      energy(k) += point.volume * elasticity::energy_density(gradient_at(point, motion), lame);
     }
   }
   return energy;
+}
+
+template <Hex8Strain strain>
+MatrixXd Hex8<strain>::prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
+                                      const Eigen::Ref<const MatrixXd>& q) {
+  const Points points = points_of<strain>(mesh, element);
+  const Lame lame = lame_of(mesh, element);
+  const Amplitudes A = amplitudes(complete_stiffness(points, lame));
+  VectorXd volumes(8);
+  MatrixXd gradients(24, 3 * (q.cols() + q0.cols()));
+  for (Index k = 0; k < q.cols() + q0.cols(); ++k) {
+    const Motion motion = motion_of(k < q.cols() ? q.col(k) : q0.col(k - q.cols()), A);
+    for (Index p = 0; p < 8; ++p) {
+      gradients.block<3, 3>(3 * p, 3 * k) = gradient_at(points[static_cast<size_t>(p)], motion).transpose();
+    }
+  }
+  for (Index p = 0; p < 8; ++p) volumes(p) = points[static_cast<size_t>(p)].volume;
+  return elasticity::prestress_work(volumes, gradients, q.cols(), lame);
 }
 
 template struct Hex8<Hex8Strain::full>;

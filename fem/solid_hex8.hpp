@@ -20,6 +20,8 @@ struct Hex8 {
   static Eigen::MatrixXd stiffness(const Mesh&, const Element&);
   static void strain_points(const Mesh&, const Element&, const StrainPointVisitor&);
   static Eigen::VectorXd strain_energy(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
+  static Eigen::MatrixXd prestress_work(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
+                                        const Eigen::Ref<const Eigen::MatrixXd>& q);
 };
 
 }  // namespace flexboom

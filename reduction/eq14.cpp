@@ -112,34 +112,26 @@ Eigen::Matrix3Xd shape_matrix(const std::vector<Column>& columns, double x) {
   return S;
 }
 
-/// Integrals that hold one shape: with int phi = 2 sigma / alpha and int x phi = 2 / alpha^2.
-void set_linear_invariants(ReducedBody& body, const Boom& boom, const std::vector<Column>& columns) {
-  const Eigen::Vector3d e_x = Eigen::Vector3d::UnitX();
+/// sum dm z z^T with z = (1, u0, S_1, ..., S_n). Shapes are s_k phi_k e with s_k = +-1: int phi = 2 sigma / alpha, int
+/// x phi = 2 / alpha^2 and int phi_k phi_l = delta_kl make every entry exact, and exactly zero where it is zero.
+Eigen::MatrixXd gram_matrix(const Boom& boom, const std::vector<Column>& columns) {
+  const double m = boom.mass_per_length * boom.length;
+  const auto row_of = [](size_t i) { return 4 + 3 * static_cast<Eigen::Index>(i); };
+  const Eigen::Index size = row_of(columns.size());
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(size, size);
+  gram(0, 0) = m;
+  gram(0, 1) = gram(1, 0) = m * boom.length / 2;
+  gram(1, 1) = m * boom.length * boom.length / 3;
   for (size_t i = 0; i < columns.size(); ++i) {
     const Column& c = columns[i];
-    const Eigen::Vector3d e = Eigen::Vector3d::Unit(c.direction);
-    const double x_phi = body.m * boom.length * tip_sign(c.k) * integral_x_phi(c.k);
-    body.Ct.col(static_cast<Eigen::Index>(i)) = body.m * tip_sign(c.k) * integral_phi(c.k) * e;
-    body.Cr0.col(static_cast<Eigen::Index>(i)) = x_phi * e_x.cross(e);
-    // -(tilde(a) tilde(b) + tilde(b) tilde(a)) = 2 (a.b) I - a b^T - b a^T, and e_x . e = 0.
-    body.J1[i] = -x_phi * (e_x * e.transpose() + e * e_x.transpose());
-  }
-}
-
-/// Integrals that hold two shapes: int phi_k phi_l = delta_kl makes them exact, and exactly zero off the diagonal.
-void set_quadratic_invariants(ReducedBody& body, const Boom& boom, const std::vector<Column>& columns) {
-  for (size_t i = 0; i < columns.size(); ++i) {
-    const auto ii = static_cast<Eigen::Index>(i);
-    body.Me(ii, ii) = body.m;
-    body.Ke(ii, ii) = body.m * std::pow(omega(boom, columns[i].k), 2);
-    const Eigen::Vector3d a = Eigen::Vector3d::Unit(columns[i].direction);
+    const Eigen::Index row = row_of(i) + c.direction;
+    gram(0, row) = gram(row, 0) = m * tip_sign(c.k) * integral_phi(c.k);
+    gram(1, row) = gram(row, 1) = m * boom.length * tip_sign(c.k) * integral_x_phi(c.k);
     for (size_t j = 0; j < columns.size(); ++j) {
-      if (columns[i].k != columns[j].k) continue;
-      const Eigen::Vector3d b = Eigen::Vector3d::Unit(columns[j].direction);
-      body.Cr1[i].col(static_cast<Eigen::Index>(j)) = body.m * a.cross(b);
-      body.J2[i][j] = body.m * (a.dot(b) * Eigen::Matrix3d::Identity() - (a * b.transpose() + b * a.transpose()) / 2);
+      if (columns[j].k == c.k) gram(row, row_of(j) + columns[j].direction) = m;
     }
   }
+  return gram;
 }
 
 DisplayShape make_display(const Boom& boom, const std::vector<Column>& columns) {
@@ -225,19 +217,14 @@ ReducedBody reduced_body(const Boom& boom, int n, Planes planes, std::string nam
   require(n >= 0, "eq14 boom: the number of shapes must not be negative, got " + std::to_string(n));
 
   const std::vector<Column> columns = make_columns(n, planes);
-  const double L = boom.length;
-  const double m = boom.mass_per_length * L;
-
   ReducedBody body = blank_body(std::move(name), static_cast<int>(columns.size()));
   body.structure = "eq14";
-  body.m = m;
-  body.mc0 = m * L / 2 * Eigen::Vector3d::UnitX();
-  body.J0 = Eigen::Vector3d(0, m * L * L / 3, m * L * L / 3).asDiagonal();
-  set_linear_invariants(body, boom, columns);
-  set_quadratic_invariants(body, boom, columns);
-  for (const Column& c : columns) {
-    body.coordinates.push_back(
-        {c.direction == 1 ? "bending_y" : "bending_z", omega(boom, c.k) / (2 * std::numbers::pi)});
+  set_invariants(body, gram_matrix(boom, columns));
+  for (Eigen::Index i = 0; i < body.n(); ++i) {
+    const Column& c = columns[static_cast<size_t>(i)];
+    const double omega_k = omega(boom, c.k);
+    body.Ke(i, i) = body.m * (omega_k * omega_k);
+    body.coordinates.push_back({c.direction == 1 ? "bending_y" : "bending_z", omega_k / (2 * std::numbers::pi)});
   }
   body.markers.push_back(tip_marker(boom, columns));
   body.display = make_display(boom, columns);

@@ -3,6 +3,7 @@
 #include "fem/constraints.hpp"
 #include "reduction/eigen_solver.hpp"
 #include "reduction/mode_kind.hpp"
+#include "reduction/reduced_body.hpp"
 
 #include <Eigen/Core>
 
@@ -11,16 +12,27 @@
 
 namespace flexboom {
 
-/// Mode shapes over all freedoms of a mesh (zero where clamped), generalised mass and stiffness.
+/// Shapes of a reduced body over all freedoms of its mesh (zero where clamped), and what they are.
 struct ModalBasis {
-  Eigen::MatrixXd Phi;         // freedoms x n
-  Eigen::VectorXd omega;       // [rad/s], ascending; within a group of equal frequencies to round-off
-  std::vector<ModeKind> kind;  // one per mode
+  Eigen::MatrixXd Phi;    // freedoms x n
+  Eigen::VectorXd omega;  // [rad/s], of modes ascending, within a group of equal frequencies to round-off; interface: 0
+  std::vector<ModeKind> kind;  // one per shape
   EigenSummary summary;
-  double mass = 0;         // of the whole mesh [kg]
-  int unknowns = 0;        // freedoms left in the eigenproblem
-  int rigid_freedoms = 0;  // rigid motions that nothing holds: 6 of a free body
+  double mass = 0;                      // of the whole mesh [kg]
+  int unknowns = 0;                     // freedoms left in the eigenproblem
+  int rigid_freedoms = 0;               // rigid motions that the shapes hold: 6 of a free body
+  std::string frame = "clamped";        // as ReducedBody::frame
+  std::vector<Coordinate> coordinates;  // one per shape
+  std::vector<Interface> interfaces;
+  std::vector<int> interface_nodes;  // the node that carries each; -1: the mean of the node set of its name
 };
+
+/// Coordinate table of a basis of modes, from `kind` and `omega`.
+std::vector<Coordinate> mode_table(const ModalBasis&);
+
+/// The listed shapes of a basis, in that order. An interface that loses a coordinate has none any more.
+/// @throws InputError for an index that does not exist.
+ModalBasis selected(const ModalBasis&, const std::vector<int>& shapes);
 
 /// Modes of the mesh with the nodes of `clamp` fixed. Groups of equal frequencies are aligned to the body's axes
 /// (deflection of the tip along y first, then z, x, rotations), signs are fixed: positive tip deflection along the
@@ -37,5 +49,11 @@ ModalBasis clamped_modes_releasing(const Mesh&, Assembly&, const Clamp&, const E
 /// enough.
 ModalBasis clamped_modes_of_kind(const Mesh&, const Assembly&, const Clamp&, int count,
                                  const std::vector<ModeKind>& kinds, EigenOptions);
+
+/// The modes of the body in the span of `shapes` (freedoms x n, zero where clamped): Me and Ke are diagonal, alignment,
+/// signs and sizes are those of clamped_modes. `rigid`: how many rigid motions the span holds.
+/// @throws NumericalError when the shapes depend on each other.
+ModalBasis ritz_modes(const Mesh&, const Assembly&, const Clamp&, const Eigen::MatrixXd& shapes, int rigid = 0,
+                      int threads = 1);
 
 }  // namespace flexboom

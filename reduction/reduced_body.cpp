@@ -83,6 +83,10 @@ void validate_flexible_part(const ReducedBody& body, const Checker& c) {
     c.count(body.J2[k].size(), n, "J2" + index);
     for (const Eigen::Matrix3d& J : body.J2[k]) c.shape(J, 3, 3, "J2" + index);
   }
+  if (body.gram.size() > 0) {
+    c.shape(body.gram, 4 + 3 * n, 4 + 3 * n, "gram");
+    c.symmetric(body.gram, "gram");
+  }
   c.check(n == 0 || Eigen::LLT<Eigen::MatrixXd>(body.Me).info() == Eigen::Success, "Me", "must be positive definite");
 }
 
@@ -95,6 +99,13 @@ void validate_points(const ReducedBody& body, const Checker& c) {
   c.check(body.display.S.size() == static_cast<size_t>(body.display.points.cols()), "display.S",
           "must have one entry per point");
   for (const Eigen::Matrix3Xd& S : body.display.S) c.shape(S, 3, body.n(), "display.S");
+}
+
+// For W = sum dm a b^T:  sum dm a x b  is its axial vector, and  -sum dm (tilde(a) tilde(b) + tilde(b) tilde(a)) / 2 =
+// tr W I - sym W.
+Eigen::Vector3d axial(const Eigen::Matrix3d& W) { return {W(1, 2) - W(2, 1), W(2, 0) - W(0, 2), W(0, 1) - W(1, 0)}; }
+Eigen::Matrix3d inertia_of(const Eigen::Matrix3d& W) {
+  return W.trace() * Eigen::Matrix3d::Identity() - (W + W.transpose()) / 2;
 }
 
 }  // namespace
@@ -117,12 +128,38 @@ ReducedBody blank_body(std::string name, int n) {
   return body;
 }
 
+void set_invariants(ReducedBody& body, Eigen::MatrixXd gram) {
+  const Eigen::Index n = body.n();
+  require(gram.rows() == 4 + 3 * n && gram.cols() == 4 + 3 * n,
+          "body \"" + body.name + "\": gram must have " + std::to_string(4 + 3 * n) + " rows and columns");
+  const auto block = [](Eigen::Index k) { return 4 + 3 * k; };
+  body.m = gram(0, 0);
+  body.mc0 = gram.block<3, 1>(1, 0);
+  body.J0 = inertia_of(gram.block<3, 3>(1, 1));
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto kk = static_cast<size_t>(k);
+    const Eigen::Matrix3d u0_S = gram.block<3, 3>(1, block(k));
+    body.Ct.col(k) = gram.block<3, 1>(block(k), 0);
+    body.Cr0.col(k) = axial(u0_S);
+    body.J1[kk] = 2 * inertia_of(u0_S);
+    for (Eigen::Index l = 0; l < n; ++l) {
+      const Eigen::Matrix3d S_S = gram.block<3, 3>(block(k), block(l));
+      body.Me(k, l) = S_S.trace();
+      body.Cr1[kk].col(l) = axial(S_S);
+      body.J2[kk][static_cast<size_t>(l)] = inertia_of(S_S);
+    }
+  }
+  body.gram = std::move(gram);
+}
+
 ReducedBody rigid_body(std::string name, double m, const Eigen::Vector3d& mc0, const Eigen::Matrix3d& J0) {
   ReducedBody body = blank_body(std::move(name), 0);
   body.structure = "rigid";
   body.m = m;
   body.mc0 = mc0;
   body.J0 = J0;
+  body.gram.resize(4, 4);  // J0 = tr W I - W with W the second moments, so W = tr J0 / 2 I - J0
+  body.gram << m, mc0.transpose(), mc0, J0.trace() / 2 * Eigen::Matrix3d::Identity() - J0;
   body.validate();
   return body;
 }

@@ -247,7 +247,11 @@ class Numerical(Case):
 class Streams(Case):
     def commands(self):
         folder = self.run_sport("--duration", "0.2")
+        body = self.folder / "body.h5"
+        self.assert_exit(OK, flexboom("reduce", BOOM4, "-o", body, "--quiet"))
         return {"run": ["run", "sport", "--no-budget", "--duration", "0.2", "--out", self.folder / "again"],
+                "reduce": ["reduce", BOOM4, "-o", self.folder / "again.h5"], "inspect": ["inspect", body],
+                "export": ["export", body, "--to", "coupling", "-o", self.folder / "boom.json"],
                 "check": ["check", "sport"], "check body": ["check", BOOM4], "modes": ["modes", BOOM4],
                 "compare": ["compare", BOOM4, "--count", "4"], "report": ["report", folder]}
 
@@ -737,6 +741,127 @@ class Modes(Case):
     def test_material_scales_the_frequencies(self):
         scaled = self.modes(BOOM4, "--material", "268e9,0.33,2840")["frequencies_hz"]
         np.testing.assert_allclose(scaled, 2 * np.array(self.modes(BOOM4)["frequencies_hz"]), rtol=1e-9)  # sqrt(E)
+
+
+class Reduce(Case):
+    def reduce(self, *arguments, code=OK):
+        """Reduced body of boom 4: its file, and what --json says."""
+        body = self.folder / "body.h5"
+        result = flexboom("reduce", BOOM4, "-o", body, "--json", *arguments)
+        self.assert_exit(code, result)
+        return body, json.loads(result.stdout)
+
+    def refused(self, *arguments, words):
+        result = flexboom("reduce", BOOM4, "-o", self.folder / "body.h5", *arguments)
+        self.assert_exit(INPUT, result)
+        self.assertEqual(result.stdout, "")
+        self.assertIn(words, result.stderr)
+        self.assertEqual(os.listdir(self.folder), [])
+
+    def failed(self, document):
+        return [c["name"] for c in document["checks"] if not c["passed"]]
+
+    def test_clamped_body_and_its_certificate(self):
+        body, document = self.reduce("--count", "6")
+        self.assertEqual(len(document["coordinates"]), 6)
+        self.assertEqual(self.failed(document), [])
+        self.assertTrue(document["stiffening"])
+        names = " ".join(c["name"] for c in document["checks"])
+        for word in ("finer quadrature", "Bessel", "six rigid motions", "unit force at tip along y"):
+            self.assertIn(word, names)
+        seen = json.loads(flexboom("inspect", body, "--json").stdout)
+        self.assertEqual(seen["mass"], document["mass"])
+        self.assertEqual(seen["coordinates"], document["coordinates"])
+        self.assertEqual(seen["provenance"]["options"], "basis clamped, count 6")
+
+    def test_same_file_again(self):
+        first = self.reduce("--count", "4")[0].read_bytes()
+        self.assertEqual(self.reduce("--count", "4")[0].read_bytes(), first)
+
+    def test_mean_axes(self):
+        document = self.reduce("--basis", "mean-axis", "--count", "4")[1]
+        self.assertEqual(document["frame"], "mean-axis")
+        self.assertEqual(self.failed(document), [])
+        self.assertIn("mean axes: Ct", [c["name"] for c in document["checks"]])
+
+    def test_craig_bampton_is_exact_at_its_interfaces(self):
+        document = self.reduce("--basis", "craig-bampton", "--interface", "root", "--interface", "tip",
+                               "--reference", "root", "--count", "4")[1]
+        self.assertEqual(document["frame"], "clamped")
+        self.assertEqual([c["direction"] for c in document["coordinates"][:6]], ["ux", "uy", "uz", "rx", "ry", "rz"])
+        self.assertEqual(self.failed(document), [])
+        tip = [c for c in document["checks"] if c["name"].startswith("unit force at tip")]
+        self.assertEqual(len(tip), 3)
+        for check in tip:
+            self.assertLess(check["relative_error"], 1e-8)  # what the static solve of the full model leaves
+
+    def test_attachment_modes_make_the_tip_exact(self):
+        without = self.reduce("--count", "2")[1]
+        exact = self.reduce("--count", "2", "--attach", "tip.Fy", "--attach", "tip.Fz")[1]
+        def error(document):
+            return next(c["relative_error"] for c in document["checks"] if c["name"].startswith("unit force at tip along y"))
+        self.assertGreater(error(without), 1e-2)  # one mode per plane leaves 3 %
+        self.assertLess(error(exact), 1e-8)
+
+    def test_hinge_basis(self):
+        document = self.reduce("--basis", "hinge", "--hinge-stiffness", "0.22,30")[1]
+        self.assertEqual(len(document["coordinates"]), 2)
+        self.assertEqual(self.failed(document), [])
+
+    def test_selection(self):
+        document = self.reduce("--count", "8", "--select", "list:1,3")[1]
+        self.assertEqual(len(document["coordinates"]), 2)
+        band = self.reduce("--count", "8", "--select", "band:0,500")[1]
+        self.assertEqual(len(band["coordinates"]), 4)
+
+    def test_options_that_do_not_fit(self):
+        self.refused("--interface", "tip", words="craig-bampton")
+        self.refused("--basis", "craig-bampton", words="--interface")
+        self.refused("--basis", "craig-bampton", "--interface", "nowhere", words="nowhere")
+        self.refused("--basis", "hinge", words="--hinge-stiffness")
+        self.refused("--select", "best", words="--select")
+        self.refused("--damping", "much", words="--damping")
+        self.refused("--attach", "tip", words="tip.Fy")
+
+    def test_name_of_the_file(self):
+        result = flexboom("reduce", BOOM4, "-o", self.folder / "body.fem")
+        self.assert_exit(INPUT, result)
+        self.assertIn("flexboom export", result.stderr)
+
+    def test_damaged_file(self):
+        body = self.reduce()[0]
+        data = bytearray(body.read_bytes())
+        data[len(data) // 2] ^= 1
+        body.write_bytes(data)
+        result = flexboom("inspect", body)
+        self.assert_exit(INPUT, result)
+        self.assertIn("changed", result.stderr)
+        body.write_bytes(data[:1000])
+        self.assert_exit(INPUT, flexboom("inspect", body))
+
+    def test_every_export_is_read_back(self):
+        clamped = self.reduce("--count", "4", "--damping", "modal:0.01")[0].rename(self.folder / "clamped.h5")
+        free = self.reduce("--basis", "craig-bampton", "--interface", "root", "--interface", "tip", "--count", "4")[0]
+        for name, body, file in (("coupling", clamped, "boom.json"), ("42", clamped, "boom42"),
+                                 ("mbdyn", clamped, "boom.fem"), ("sid", clamped, "boom.SID_FEM"),
+                                 ("exudyn", clamped, "boom.hdf5"), ("simscape", free, "boom.mat"),
+                                 ("matrix-market", clamped, "matrices")):
+            result = flexboom("export", body, "--to", name, "-o", self.folder / file, "--json")
+            self.assert_exit(OK, result)
+            document = json.loads(result.stdout)
+            self.assertTrue(document["passed"], name)
+            self.assertGreater(len(document["checks"]), 3, name)
+            self.assertTrue((self.folder / file).exists(), name)
+
+    def test_export_that_cannot_be(self):
+        body = self.reduce()[0]
+        for format_, words in (("adams", "adams"), ("simscape", "craig-bampton")):
+            result = flexboom("export", body, "--to", format_, "-o", self.folder / "x.mat")
+            self.assert_exit(INPUT, result)
+            self.assertIn(words, result.stderr.lower())
+        result = flexboom("export", body, "--to", "sid", "-o", self.folder / "x.sid", "--set", "colour=red")
+        self.assert_exit(INPUT, result)
+        self.assertIn("colour", result.stderr)
 
 
 class Compare(Case):

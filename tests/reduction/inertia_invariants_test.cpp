@@ -45,8 +45,8 @@ BeamGeometry full_boom() {
   return g;
 }
 
-double error_of(const std::vector<InvariantCheck>& checks, const std::string& name) {
-  for (const InvariantCheck& c : checks) {
+double error_of(const std::vector<BodyCheck>& checks, const std::string& name) {
+  for (const BodyCheck& c : checks) {
     if (c.name == name) return c.relative_error;
   }
   ADD_FAILURE() << "no check " << name;
@@ -91,7 +91,7 @@ TEST(Reduce, EveryInvariantAgreesWithIndependentRoutes) {
   for (const BeamGeometry& g : {boom4(BeamTheory::euler_bernoulli, false), boom4(BeamTheory::euler_bernoulli, true),
                                 boom4(BeamTheory::timoshenko, true), full_boom()}) {
     const Reduced r = reduced(g, 8);
-    for (const InvariantCheck& c : check_invariants(r.body, r.boom.mesh, r.boom.assembly, r.basis)) {
+    for (const BodyCheck& c : check_invariants(r.body, r.boom.mesh, r.boom.assembly, r.basis)) {
       EXPECT_TRUE(c.passed) << c.name << " " << c.value << " against " << c.reference << ", " << c.relative_error;
     }
   }
@@ -157,6 +157,31 @@ TEST(Reduce, TurningTheBodyTurnsItsInvariants) {
     EXPECT_LT((turned.Cr1[k] - A * r.body.Cr1[k]).norm(), 1e-13 * r.body.Me.norm());
     EXPECT_LT((turned.J1[k] - A * r.body.J1[k] * A.transpose()).norm(), 1e-13 * m);
     EXPECT_LT((turned.J2[k][3] - A * r.body.J2[k][3] * A.transpose()).norm(), 1e-13 * r.body.Me.norm());
+  }
+}
+
+TEST(Reduce, ShiftingTheFrameShiftsItsInvariants) {
+  const Reduced r = reduced(full_boom(), 4);
+  const Eigen::Vector3d d(0.3, -0.2, 0.5);  // old origin seen from the new one
+  Mesh mesh = r.boom.mesh;
+  mesh.nodes.colwise() += d;
+  const ReducedBody shifted = reduce(mesh, r.boom.assembly, r.basis, "shifted");
+  const ReducedBody& b = r.body;
+  const auto tilde = [](const Eigen::Vector3d& a) {
+    return (Eigen::Matrix3d() << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0).finished();
+  };
+  const Eigen::Matrix3d D = tilde(d);
+  const double m = b.m;
+  EXPECT_LT((shifted.mc0 - b.mc0 - m * d).norm(), 1e-14 * m);
+  const Eigen::Matrix3d J0 = b.J0 - D * tilde(b.mc0) - tilde(b.mc0) * D - m * D * D;
+  EXPECT_LT((shifted.J0 - J0).norm(), 1e-14 * m);
+  EXPECT_LT((shifted.Ct - b.Ct).norm(), 1e-14 * m);
+  EXPECT_LT((shifted.Cr0 - b.Cr0 - D * b.Ct).norm(), 1e-13 * m);
+  EXPECT_LT((shifted.Me - b.Me).norm(), 1e-14 * b.Me.norm());
+  for (size_t k = 0; k < 4; ++k) {
+    const Eigen::Matrix3d C = tilde(b.Ct.col(static_cast<Eigen::Index>(k)));
+    EXPECT_LT((shifted.J1[k] - b.J1[k] + D * C + C * D).norm(), 1e-13 * m);
+    EXPECT_LT((shifted.Cr1[k] - b.Cr1[k]).norm() + (shifted.J2[k][1] - b.J2[k][1]).norm(), 1e-13 * b.Me.norm());
   }
 }
 

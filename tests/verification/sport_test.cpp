@@ -147,7 +147,7 @@ TEST(Sport, EveryBodyReportsItsInvariantChecks) {
   const RunResult& r = first_second();
   for (const PreparedBody& p : r.bodies) {
     EXPECT_GT(p.checks.size(), 10U);
-    for (const InvariantCheck& c : p.checks) EXPECT_LT(c.relative_error, 1e-12) << p.body.name << "." << c.name;
+    for (const BodyCheck& c : p.checks) EXPECT_LT(c.relative_error, 1e-12) << p.body.name << "." << c.name;
   }
 }
 

@@ -1,0 +1,30 @@
+#include "apps/reduction.hpp"
+#include "fem/check.hpp"
+#include "fem/stopwatch.hpp"
+#include "reduction/body_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace flexboom {
+
+int reduce_command(const ReduceArguments& a, const CommonOptions& common) {
+  require(a.file.extension() == ".h5" || a.file.extension() == ".hdf5",
+          fmt::format("-o {}: a reduced body is an HDF5 file, name it .h5; other formats by `flexboom export`",
+                      a.file.string()));
+  const Stopwatch clock;
+  Model model = load_model(a.model, a.options);
+  const ReducedBody body = make_reduced_body(model, a, common.threads);
+  write_body_file(a.file, body);
+  if (common.json) {
+    fmt::print("{}\n", body_json(body, body.certificate, model.notes).dump(2));
+  } else if (!common.quiet) {
+    for (const std::string& note : model.notes) print_note("note: " + note);
+    fmt::print("{}", description(body, body.certificate));
+    print_note(fmt::format("{}: {:.2f} s", a.file.string(), clock.seconds()));
+  }
+  return std::ranges::all_of(body.certificate, &BodyCheck::passed) ? exit_ok : exit_check_failed;
+}
+
+}  // namespace flexboom

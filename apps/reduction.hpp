@@ -1,0 +1,29 @@
+#pragma once
+
+#include "apps/commands.hpp"
+#include "reduction/reduced_body.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// The reduced body that `flexboom reduce` writes, with its certificate and provenance. The mesh of `model` may get
+/// reference nodes of interfaces; its notes grow by what the basis has to say.
+/// @throws InputError for options that do not fit each other or the model, NumericalError as the bases.
+ReducedBody make_reduced_body(Model& model, const ReduceArguments&, int threads);
+
+/// Mass, centre, inertia, coordinate table and checks of a body, as text.
+std::string description(const ReducedBody&, const std::vector<BodyCheck>& checks);
+
+/// The same as a document; `notes` beside it.
+nlohmann::ordered_json body_json(const ReducedBody&, const std::vector<BodyCheck>& checks,
+                                 const std::vector<std::string>& notes);
+nlohmann::ordered_json checks_json(const std::vector<BodyCheck>&);
+
+/// "modal:0.005", "loss-factor:0.01", "rayleigh:ALPHA,BETA", "none". @throws InputError.
+DampingRule parse_damping(const std::string&);
+
+}  // namespace flexboom

@@ -1,0 +1,275 @@
+#include "reduction/exudyn_dictionary.hpp"
+
+#include "fem/check.hpp"
+#include "fem/files.hpp"
+
+#include <hdf5.h>
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+namespace flexboom {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using IntegerRowMajor = Eigen::Matrix<long, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+void check(bool condition, const std::string& what) { require(condition, "HDF5: cannot " + what); }
+
+/// An open object of the library.
+class Handle {
+ public:
+  Handle(hid_t id, herr_t (*close)(hid_t), const std::string& what) : id_(id), close_(close) { check(id >= 0, what); }
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
+  ~Handle() { close_(id_); }
+  operator hid_t() const { return id_; }
+
+ private:
+  hid_t id_;
+  herr_t (*close_)(hid_t);
+};
+
+/// The library prints nothing while this lives.
+class Quiet {
+ public:
+  Quiet() {
+    H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  }
+  Quiet(const Quiet&) = delete;
+  Quiet& operator=(const Quiet&) = delete;
+  ~Quiet() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
+
+ private:
+  H5E_auto2_t print_ = nullptr;
+  void* data_ = nullptr;
+};
+
+Handle text_type() {
+  const hid_t type = H5Tcopy(H5T_C_S1);
+  check(H5Tset_size(type, H5T_VARIABLE) >= 0 && H5Tset_cset(type, H5T_CSET_UTF8) >= 0, "make a type of text");
+  return {type, H5Tclose, "make a type of text"};
+}
+
+Handle property_list(hid_t kind) {
+  const hid_t list = H5Pcreate(kind);
+  check(H5Pset_obj_track_times(list, false) >= 0, "leave out times");  // equal content, equal bytes
+  return {list, H5Pclose, "make a property list"};
+}
+
+void write_datatype(hid_t object, const char* python_type) {
+  const Handle type = text_type();
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose, "make a scalar");
+  const Handle attribute(H5Acreate2(object, "datatype", type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
+                         "make an attribute");
+  check(H5Awrite(attribute, type, &python_type) >= 0, "write an attribute");
+}
+
+void write_dataset(hid_t parent, const std::string& name, const char* python_type, hid_t file_type, hid_t memory_type,
+                   std::span<const hsize_t> shape, const void* data) {
+  const Handle space(
+      shape.empty() ? H5Screate(H5S_SCALAR) : H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
+      H5Sclose, "make a shape");
+  const Handle properties = property_list(H5P_DATASET_CREATE);
+  const Handle dataset(H5Dcreate2(parent, name.c_str(), file_type, space, H5P_DEFAULT, properties, H5P_DEFAULT),
+                       H5Dclose, "make " + name);
+  check(H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0, "write " + name);
+  write_datatype(dataset, python_type);
+}
+
+/// Writes one value under its name.
+struct Writer {
+  hid_t parent;
+  const std::string& name;
+
+  void operator()(long value) const { write_dataset(parent, name, "int", H5T_STD_I64LE, H5T_NATIVE_LONG, {}, &value); }
+  void operator()(double value) const {
+    write_dataset(parent, name, "float", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, {}, &value);
+  }
+  void operator()(const std::string& value) const {
+    const char* text = value.c_str();
+    const Handle type = text_type();
+    write_dataset(parent, name, "str", type, type, {}, &text);
+  }
+  void operator()(const std::vector<std::string>& value) const {
+    const Handle list = group("list");
+    for (size_t i = 0; i < value.size(); ++i) {
+      const std::string item = "item_" + std::to_string(i);
+      Writer{list, item}(value[i]);
+    }
+  }
+  void operator()(const Eigen::VectorXd& value) const {
+    const std::array shape = {static_cast<hsize_t>(value.size())};
+    write_dataset(parent, name, "ndarray", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, shape, value.data());
+  }
+  void operator()(const Eigen::MatrixXd& value) const {
+    const RowMajor rows = value;
+    write_dataset(parent, name, "ndarray", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, shape_of(value), rows.data());
+  }
+  void operator()(const IntegerVector& value) const {
+    const std::array shape = {static_cast<hsize_t>(value.size())};
+    write_dataset(parent, name, "ndarray", H5T_STD_I64LE, H5T_NATIVE_LONG, shape, value.data());
+  }
+  void operator()(const IntegerMatrix& value) const {
+    const IntegerRowMajor rows = value;
+    write_dataset(parent, name, "ndarray", H5T_STD_I64LE, H5T_NATIVE_LONG, shape_of(value), rows.data());
+  }
+  void operator()(EmptyDictionary) const { group("dict"); }
+
+ private:
+  template <class Matrix>
+  static std::array<hsize_t, 2> shape_of(const Matrix& value) {
+    return {static_cast<hsize_t>(value.rows()), static_cast<hsize_t>(value.cols())};
+  }
+
+  Handle group(const char* python_type) const {
+    const Handle properties = property_list(H5P_GROUP_CREATE);
+    const hid_t id = H5Gcreate2(parent, name.c_str(), H5P_DEFAULT, properties, H5P_DEFAULT);
+    check(id >= 0, "make " + name);
+    write_datatype(id, python_type);
+    return {id, H5Gclose, "make " + name};
+  }
+};
+
+/// The bytes of a file that the library builds in memory.
+std::string file_image(const ExudynDictionary& dictionary) {
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "make a property list");
+  check(H5Pset_fapl_core(access, size_t{1} << 16, false) >= 0, "work in memory");
+  const Handle creation = property_list(H5P_FILE_CREATE);
+  const Handle file(H5Fcreate("exudyn", H5F_ACC_TRUNC, creation, access), H5Fclose, "make a file");
+  for (const auto& [name, value] : dictionary) std::visit(Writer{file, name}, value);
+  check(H5Fflush(file, H5F_SCOPE_GLOBAL) >= 0, "finish the file");
+  const ssize_t size = H5Fget_file_image(file, nullptr, 0);
+  check(size > 0, "measure the file");
+  std::string bytes(static_cast<size_t>(size), '\0');
+  check(H5Fget_file_image(file, bytes.data(), bytes.size()) == size, "copy the file");
+  return bytes;
+}
+
+/// Reads the entries of one open file.
+class Reader {
+ public:
+  explicit Reader(const std::filesystem::path& path)
+      : file_(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, "open it: it is no HDF5 file"),
+        bytes_(std::filesystem::file_size(path)) {}
+
+  ExudynDictionary all() const {
+    ExudynDictionary dictionary;
+    H5G_info_t info;
+    check(H5Gget_info(file_, &info) >= 0, "list the entries");
+    for (hsize_t i = 0; i < info.nlinks; ++i) {
+      const std::string name = link_name(i);
+      const Handle object(H5Oopen(file_, name.c_str(), H5P_DEFAULT), H5Oclose, "open " + name);
+      add(dictionary, name, object);
+    }
+    return dictionary;
+  }
+
+ private:
+  std::string link_name(hsize_t i) const {
+    const auto get = [&](char* to, size_t size) {
+      return H5Lget_name_by_idx(file_, ".", H5_INDEX_NAME, H5_ITER_INC, i, to, size, H5P_DEFAULT);
+    };
+    const ssize_t size = get(nullptr, 0);
+    check(size > 0, "read the name of an entry");
+    std::string name(static_cast<size_t>(size), '\0');
+    check(get(name.data(), name.size() + 1) == size, "read the name of an entry");
+    return name;
+  }
+
+  void add(ExudynDictionary& dictionary, const std::string& name, hid_t object) const {
+    if (H5Iget_type(object) == H5I_GROUP) {
+      if (H5Lexists(object, "item_0", H5P_DEFAULT) > 0) dictionary[name] = list(object, name);
+      return;
+    }
+    if (H5Iget_type(object) != H5I_DATASET) return;
+    const Handle type(H5Dget_type(object), H5Tclose, "read the type of " + name);
+    const std::vector<hsize_t> shape = shape_of(object, name);
+    switch (H5Tget_class(type)) {
+      case H5T_STRING:
+        if (shape.empty()) dictionary[name] = text(object, name);
+        break;
+      case H5T_INTEGER:
+        dictionary[name] = numbers<long, IntegerVector, IntegerRowMajor, IntegerMatrix>(object, name, shape);
+        break;
+      case H5T_FLOAT:
+        dictionary[name] = numbers<double, Eigen::VectorXd, RowMajor, Eigen::MatrixXd>(object, name, shape);
+        break;
+      default:
+        break;
+    }
+  }
+
+  std::vector<hsize_t> shape_of(hid_t dataset, const std::string& name) const {
+    const Handle space(H5Dget_space(dataset), H5Sclose, "read the shape of " + name);
+    const int axes = H5Sget_simple_extent_ndims(space);
+    check(axes >= 0 && axes <= 2, "use " + name + ": it has " + std::to_string(axes) + " axes, at most 2 are known");
+    std::vector<hsize_t> shape(static_cast<size_t>(axes));
+    check(H5Sget_simple_extent_dims(space, shape.data(), nullptr) == axes, "read the shape of " + name);
+    hsize_t room = bytes_;  // nothing in these files is compressed
+    for (const hsize_t n : shape) {
+      check(n <= room, "use " + name + ": it claims to be larger than the file");
+      if (n > 0) room /= n;
+    }
+    return shape;
+  }
+
+  template <class Number, class Vector, class Rows, class Matrix>
+  static ExudynValue numbers(hid_t dataset, const std::string& name, const std::vector<hsize_t>& shape) {
+    const auto size = [&](size_t axis) { return axis < shape.size() ? static_cast<Eigen::Index>(shape[axis]) : 1; };
+    Rows rows(size(0), size(1));
+    const hid_t type = std::is_same_v<Number, double> ? H5T_NATIVE_DOUBLE : H5T_NATIVE_LONG;
+    check(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()) >= 0, "read " + name);
+    if (shape.empty()) return rows(0, 0);
+    if (shape.size() == 1) return Vector(rows.col(0));
+    return Matrix(rows);
+  }
+
+  static std::string text(hid_t dataset, const std::string& name) {
+    const Handle stored(H5Dget_type(dataset), H5Tclose, "read the type of " + name);
+    check(H5Tis_variable_str(stored) > 0, "read " + name + ": a text of variable length is expected");
+    const Handle type = text_type();
+    char* value = nullptr;
+    check(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) >= 0 && value != nullptr, "read " + name);
+    std::string copy(value);
+    H5free_memory(value);
+    return copy;
+  }
+
+  std::vector<std::string> list(hid_t group, const std::string& name) const {
+    std::vector<std::string> items;
+    for (std::string item = "item_0"; H5Lexists(group, item.c_str(), H5P_DEFAULT) > 0;
+         item = "item_" + std::to_string(items.size())) {
+      const std::string full = name + "/" + item;
+      const Handle dataset(H5Dopen2(group, item.c_str(), H5P_DEFAULT), H5Dclose, "open " + full);
+      items.push_back(text(dataset, full));
+    }
+    return items;
+  }
+
+  Handle file_;
+  std::uintmax_t bytes_;
+};
+
+}  // namespace
+
+void write_exudyn_dictionary(const std::filesystem::path& path, const ExudynDictionary& dictionary) {
+  const Quiet quiet;
+  write_file(path, file_image(dictionary));
+}
+
+ExudynDictionary read_exudyn_dictionary(const std::filesystem::path& path) {
+  const Quiet quiet;
+  std::error_code error;
+  require(std::filesystem::is_regular_file(path, error), "cannot read " + path.string() + ": there is no such file");
+  try {
+    return Reader(path).all();
+  } catch (const InputError& fault) {
+    throw InputError(path.string() + ": " + fault.what());
+  }
+}
+
+}  // namespace flexboom

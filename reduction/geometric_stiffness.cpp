@@ -1,0 +1,215 @@
+#include "reduction/geometric_stiffness.hpp"
+
+#include "fem/check.hpp"
+#include "fem/parallel.hpp"
+#include "reduction/eigen_shift.hpp"
+#include "reduction/geometric_stiffness_loads.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+/// T^T F: loads on the unknowns from loads on all freedoms.
+MatrixXd restricted(const Unknowns& left, const MatrixXd& F) {
+  MatrixXd result = F(left.free_dofs(), Eigen::all);
+  if (!left.follower.empty()) result += left.follower_rows.transpose() * F(left.follower, Eigen::all);
+  return result;
+}
+
+MatrixXd solve(const SparseMatrix& K, const MatrixXd& F) {
+  const SparseMatrix no_mass(K.rows(), K.cols());
+  ShiftedFactor factor({K, no_mass});
+  factor.move_to(0);
+  MatrixXd X(F.rows(), F.cols());
+  factor.factor().solve(F, X);
+  return X;
+}
+
+/// Rigid accelerations (6 x loads: translation, rotation about the origin) that loads F on a free body cause; T are its
+/// rigid motions.
+MatrixXd rigid_accelerations(const MatrixXd& F, const MatrixXd& T, const MatrixXd& MT) {
+  return (T.transpose() * MT).completeOrthogonalDecomposition().solve(T.transpose() * F);
+}
+
+/// Six unknowns that hold a free body without straining it: the rows of T that are the most independent.
+std::vector<char> pins(const MatrixXd& T) {
+  const double length = std::sqrt(T.rightCols<3>().squaredNorm() / T.leftCols<3>().squaredNorm());
+  MatrixXd scaled = T;
+  scaled.rightCols<3>() /= length;
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(scaled.transpose());
+  std::vector<char> pinned(static_cast<size_t>(T.rows()), 0);
+  for (Index i = 0; i < qr.rank(); ++i) pinned[static_cast<size_t>(qr.colsPermutation().indices()(i))] = 1;
+  return pinned;
+}
+
+/// K X = F where the pinned unknowns are zero.
+MatrixXd solve_pinned(const SparseMatrix& K, const MatrixXd& F, const std::vector<char>& pinned) {
+  std::vector<int> kept;
+  std::vector<int> place(pinned.size(), -1);
+  for (size_t i = 0; i < pinned.size(); ++i) {
+    if (pinned[i]) continue;
+    place[i] = static_cast<int>(kept.size());
+    kept.push_back(static_cast<int>(i));
+  }
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(static_cast<size_t>(K.nonZeros()));
+  for (int j = 0; j < K.outerSize(); ++j) {
+    for (SparseMatrix::InnerIterator it(K, j); it; ++it) {
+      const int row = place[static_cast<size_t>(it.row())], column = place[static_cast<size_t>(j)];
+      if (row >= 0 && column >= 0) entries.emplace_back(row, column, it.value());
+    }
+  }
+  SparseMatrix K_kept(std::ssize(kept), std::ssize(kept));
+  K_kept.setFromTriplets(entries.begin(), entries.end());
+  MatrixXd X = MatrixXd::Zero(F.rows(), F.cols());
+  X(kept, Eigen::all) = solve(K_kept, F(kept, Eigen::all));
+  return X;
+}
+
+/// Whether the body is free. @throws InputError when it can move in some ways and not in all.
+bool is_free(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp) {
+  const int rigid = rigid_freedoms(mesh, dofs, clamp);
+  require(rigid == 0 || rigid == 6,
+          fmt::format("geometric stiffness: the clamp leaves {} of the six rigid motions; hold the body, or leave it "
+                      "free for inertia relief",
+                      rigid));
+  return rigid == 6;
+}
+
+/// Unit loads, what of them is inertia, and the static displacements that they cause.
+struct Statics {
+  MatrixXd F;           // freedoms x loads
+  LinearFields fields;  // 12 x loads
+  MatrixXd U0;          // freedoms x loads
+};
+
+/// Takes the rigid accelerations of a free body out of its loads, and solves.
+void relieve(Statics& statics, const Mesh& mesh, const Assembly& assembly, const Unknowns& left) {
+  const MatrixXd T = rigid_motions(mesh, assembly.dofs);
+  const MatrixXd MT = symmetric_product(assembly.M, T);
+  const MatrixXd x = rigid_accelerations(statics.F, T, MT);
+  statics.F -= MT * x;
+  statics.fields += inertial_fields().rightCols<6>() * x;  // of -a and -alpha x u0
+  const MatrixXd T_left = T(left.free_dofs(), Eigen::all);
+  statics.U0 = left.expanded(solve_pinned(left.reduced(assembly.K), restricted(left, statics.F), pins(T_left)));
+}
+
+Statics statics(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const std::vector<MatrixXd>& loads,
+                const SparseFactor* factor) {
+  Index count = 0;
+  for (const MatrixXd& part : loads) count += part.cols();
+  Statics result{MatrixXd(assembly.dofs.count, count), LinearFields::Zero(12, count), {}};
+  result.fields.leftCols<inertial_loads>() = inertial_fields();
+  for (Index first = 0; const MatrixXd& part : loads) {
+    result.F.middleCols(first, part.cols()) = part;
+    first += part.cols();
+  }
+  const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
+  if (is_free(mesh, assembly.dofs, clamp)) {
+    relieve(result, mesh, assembly, left);
+    return result;
+  }
+  MatrixXd X = restricted(left, result.F);
+  if (factor != nullptr) {
+    factor->solve(X, X);
+  } else {
+    X = solve(left.reduced(assembly.K), X);
+  }
+  result.U0 = left.expanded(X);
+  return result;
+}
+
+/// Second-order work of the prestresses U0 on pairs of shapes, summed over the elements: pairs x loads.
+MatrixXd prestress_work(const Mesh& mesh, const DofMap& dofs, const MatrixXd& U0, const MatrixXd& Phi, int threads) {
+  // Blocks of fixed number, so that the sum does not depend on the number of threads.
+  constexpr int blocks = 8;
+  const auto elements = static_cast<int>(mesh.elements.size());
+  std::array<MatrixXd, blocks> parts;
+  parallel_for(threads, blocks, 1, [&](int b) {
+    MatrixXd& part = parts[static_cast<size_t>(b)];
+    part.setZero(Phi.cols() * (Phi.cols() + 1) / 2, U0.cols());
+    for (int e = elements * b / blocks; e < elements * (b + 1) / blocks; ++e) {
+      const Element& element = mesh.elements[static_cast<size_t>(e)];
+      const std::vector<int> element_dofs = dofs.of_element(mesh, e);
+      part +=
+          type_of(element).prestress_work(mesh, element, U0(element_dofs, Eigen::all), Phi(element_dofs, Eigen::all));
+    }
+  });
+  for (size_t b = 1; b < blocks; ++b) parts[0] += parts[b];
+  return parts[0];
+}
+
+/// The symmetric matrix of a packed lower triangle.
+MatrixXd unpacked(const Eigen::Ref<const VectorXd>& pairs, Index n) {
+  MatrixXd A(n, n);
+  for (Index k = 0, first = 0; k < n; first += n - k, ++k) {
+    A.col(k).tail(n - k) = pairs.segment(first, n - k);
+    A.row(k).tail(n - k) = pairs.segment(first, n - k).transpose();
+  }
+  return A;
+}
+
+}  // namespace
+
+GeometricStiffness geometric_stiffness(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp,
+                                       const MatrixXd& Phi, const GeometricOptions& options) {
+  require(assembly.K.rows() == assembly.dofs.count, "geometric stiffness: the stiffness matrix was released");
+  require(Phi.rows() == assembly.dofs.count,
+          fmt::format("geometric stiffness: shapes have {} entries, the mesh has {} freedoms", Phi.rows(),
+                      assembly.dofs.count));
+  std::vector<MatrixXd> loads = {inertial_forces(mesh, assembly)};
+  for (const std::string& name : options.markers) loads.push_back(marker_forces(mesh, assembly.dofs, name));
+  const Statics state = statics(mesh, assembly, clamp, loads, options.factor);
+  const MatrixXd work = prestress_work(mesh, assembly.dofs, state.U0, Phi, options.threads);
+  std::vector<MatrixXd> matrices;
+  for (Index c = 0; c < work.cols(); ++c) matrices.push_back(unpacked(work.col(c), Phi.cols()));
+  add_inertia_of_arms(matrices, mesh, assembly.dofs, state.fields, Phi);
+  add_rigid_connections(matrices, mesh, assembly, state.F, state.U0, Phi);
+
+  auto next = matrices.begin();
+  const auto take = [&next](Index count) {
+    std::vector<MatrixXd> result(next, next + count);
+    next += count;
+    return result;
+  };
+  GeometricStiffness Kg;
+  Kg.spin = take(6);
+  Kg.acceleration = take(3);
+  Kg.angular_acceleration = take(3);
+  for (size_t i = 0; i < options.markers.size(); ++i) {
+    MarkerStiffness& marker = Kg.markers.emplace_back();
+    marker.marker = options.markers[i];
+    marker.force = take(3);
+    marker.torque = take(loads[i + 1].cols() - 3);
+  }
+  return Kg;
+}
+
+MatrixXd motion_stiffness(const ReducedBody& body, const Vector3d& omega, const Vector3d& acceleration,
+                          const Vector3d& angular_acceleration) {
+  MatrixXd K = MatrixXd::Zero(body.n(), body.n());
+  if (body.Kg.spin.empty()) return K;
+  for (size_t c = 0; c < 6; ++c) {
+    const auto [i, j] = spin_products[c];
+    K += omega(i) * omega(j) * body.Kg.spin[c];
+  }
+  for (size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<Index>(i);
+    K += acceleration(axis) * body.Kg.acceleration[i] + angular_acceleration(axis) * body.Kg.angular_acceleration[i];
+  }
+  return K;
+}
+
+}  // namespace flexboom

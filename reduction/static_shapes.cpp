@@ -1,0 +1,82 @@
+#include "reduction/static_shapes.hpp"
+
+#include <utility>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// K_ii (lower triangle) and K_ib of a symmetric matrix, lower triangle; i: not held, b: held.
+std::pair<SparseMatrix, SparseMatrix> parts(const SparseMatrix& K, const std::vector<int>& held,
+                                            const std::vector<int>& left) {
+  std::vector<int> place_held(static_cast<size_t>(K.cols()), -1), place_left = place_held;
+  for (size_t i = 0; i < held.size(); ++i) place_held[static_cast<size_t>(held[i])] = static_cast<int>(i);
+  for (size_t i = 0; i < left.size(); ++i) place_left[static_cast<size_t>(left[i])] = static_cast<int>(i);
+  std::vector<Eigen::Triplet<double>> among, to_held;
+  among.reserve(static_cast<size_t>(K.nonZeros()));
+  for (int j = 0; j < K.cols(); ++j) {
+    for (SparseMatrix::InnerIterator it(K, j); it; ++it) {
+      const auto row = static_cast<size_t>(it.row()), col = static_cast<size_t>(j);
+      if (row < col) continue;
+      if (place_left[row] >= 0 && place_left[col] >= 0)
+        among.emplace_back(place_left[row], place_left[col], it.value());
+      if (place_left[row] >= 0 && place_held[col] >= 0)
+        to_held.emplace_back(place_left[row], place_held[col], it.value());
+      if (place_held[row] >= 0 && place_left[col] >= 0)
+        to_held.emplace_back(place_left[col], place_held[row], it.value());
+    }
+  }
+  std::pair<SparseMatrix, SparseMatrix> result{{std::ssize(left), std::ssize(left)},
+                                               {std::ssize(left), std::ssize(held)}};
+  result.first.setFromTriplets(among.begin(), among.end());
+  result.second.setFromTriplets(to_held.begin(), to_held.end());
+  return result;
+}
+
+std::vector<int> others(Index count, const std::vector<int>& held) {
+  std::vector<char> is_held(static_cast<size_t>(count), 0);
+  for (const int i : held) is_held[static_cast<size_t>(i)] = 1;
+  std::vector<int> left;
+  for (int i = 0; i < count; ++i) {
+    if (!is_held[static_cast<size_t>(i)]) left.push_back(i);
+  }
+  return left;
+}
+
+}  // namespace
+
+StaticSolver::StaticSolver(const SparseMatrix& K, const std::vector<int>& held)
+    : count_(K.cols()),
+      held_(held),
+      left_(others(K.cols(), held)),
+      K_(parts(K, held_, left_)),
+      factor_(K_.first, FactorKind::definite) {
+  factor_.factorise(K_.first);
+}
+
+MatrixXd StaticSolver::solve(const MatrixXd& f) const {
+  MatrixXd x(f.rows(), f.cols());
+  factor_.solve(f, x);
+  // One correction by what is left of the load: the factor of a slender body loses digits that K still has.
+  const MatrixXd left_over = f - symmetric_product(K_.first, x);
+  MatrixXd correction(f.rows(), f.cols());
+  factor_.solve(left_over, correction);
+  return x + correction;
+}
+
+MatrixXd StaticSolver::displaced(const MatrixXd& values) const {
+  MatrixXd x(count_, values.cols());
+  x(held_, Eigen::all) = values;
+  x(left_, Eigen::all) = solve(-(K_.second * values));
+  return x;
+}
+
+MatrixXd StaticSolver::loaded(const MatrixXd& f) const {
+  MatrixXd x = MatrixXd::Zero(count_, f.cols());
+  x(left_, Eigen::all) = solve(f(left_, Eigen::all));
+  return x;
+}
+
+}  // namespace flexboom

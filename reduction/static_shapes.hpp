@@ -1,0 +1,33 @@
+#pragma once
+
+#include "fem/sparse_factor.hpp"
+
+#include <Eigen/Core>
+
+#include <utility>
+#include <vector>
+
+namespace flexboom {
+
+/// Static solutions of K x = f with some of the unknowns held: one factorisation of the others.
+class StaticSolver {
+ public:
+  /// K: lower triangle. @throws NumericalError when the held unknowns leave a motion without stiffness.
+  StaticSolver(const SparseMatrix& K, const std::vector<int>& held);
+
+  /// x with the held unknowns at the given values and no load on the others: a column per column of `values`.
+  Eigen::MatrixXd displaced(const Eigen::MatrixXd& values) const;
+
+  /// x of loads f (all unknowns x k), zero where held.
+  Eigen::MatrixXd loaded(const Eigen::MatrixXd& f) const;
+
+ private:
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& f) const;
+
+  Eigen::Index count_ = 0;
+  std::vector<int> held_, left_;
+  std::pair<SparseMatrix, SparseMatrix> K_;  // K_ii (lower triangle) and K_ib; i: left, b: held
+  SparseFactor factor_;
+};
+
+}  // namespace flexboom

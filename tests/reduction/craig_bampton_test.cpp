@@ -1,0 +1,264 @@
+#include "reduction/craig_bampton.hpp"
+
+#include "fem/check.hpp"
+#include "fem/solid_boom.hpp"
+#include "reduction/inertia_invariants.hpp"
+#include "tests/reduction/booms.hpp"
+#include "tests/reduction/compliance.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include <cmath>
+#include <numbers>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using test::boom4;
+using test::make_boom;
+
+CraigBamptonOptions with(int modes, const std::string& reference = "", bool orthonormal = false) {
+  CraigBamptonOptions options;
+  options.modes.num_modes = modes;
+  options.reference = reference;
+  options.orthonormal = orthonormal;
+  return options;
+}
+
+/// A boom of SPORT with interfaces at both ends.
+struct TwoEnds {
+  test::Boom boom;
+  std::vector<InterfaceNode> ends;
+
+  explicit TwoEnds(const BeamGeometry& geometry) {
+    boom.mesh = make_mesh(geometry);
+    ends = place_interfaces(boom.mesh, {{"root", "root"}, {"tip", "tip"}});
+    boom.assembly = assemble(boom.mesh);
+  }
+  ModalBasis basis(const CraigBamptonOptions& options) const {
+    return craig_bampton(boom.mesh, boom.assembly, ends, options);
+  }
+  ReducedBody body(const CraigBamptonOptions& options) const {
+    return reduce(boom.mesh, boom.assembly, basis(options), "boom");
+  }
+};
+
+TwoEnds sip() { return TwoEnds(boom4(BeamTheory::timoshenko, true, 4, 6)); }
+
+VectorXd frequencies_hz(const ReducedBody& body) {
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(body.Me, body.Ke);
+  return solver.eigenvalues().reverse().cwiseInverse().cwiseSqrt() / (2 * std::numbers::pi);
+}
+
+TEST(CraigBampton, CoordinatesAreInterfaceFreedomsThenNormalModes) {
+  const TwoEnds t = sip();
+  const ReducedBody body = t.body(with(4));
+  EXPECT_EQ(body.frame, "free");
+  ASSERT_EQ(body.n(), 16);
+  ASSERT_EQ(body.interfaces.size(), 2U);
+  EXPECT_EQ(body.interfaces[1].first_coordinate, 6);
+  EXPECT_EQ(body.coordinates[7].kind, "interface");
+  EXPECT_EQ(body.coordinates[7].interface, "tip");
+  EXPECT_EQ(body.coordinates[7].direction, "uy");
+  EXPECT_EQ(body.coordinates[7].frequency_hz, 0);
+  EXPECT_EQ(body.coordinates[12].kind, "bending_y");
+  // A unit of an interface coordinate is the unit motion of its marker; the others and the normal modes leave it.
+  for (int i = 0; i < 2; ++i) {
+    const Marker& m = marker(body, body.interfaces[static_cast<size_t>(i)].name);
+    MatrixXd motion(6, body.n());
+    motion << m.S, m.S_theta;
+    MatrixXd expected = MatrixXd::Zero(6, body.n());
+    expected.middleCols(6 * i, 6).setIdentity();
+    EXPECT_EQ((motion - expected).norm(), 0);  // exact: they are set, not solved for
+  }
+}
+
+TEST(CraigBampton, AChoiceKeepsTheInterfacesThatAreWhole) {
+  const ModalBasis basis = sip().basis(with(4));
+  const ModalBasis some = selected(basis, {0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11, 14});
+  EXPECT_EQ(some.interfaces[0].first_coordinate, -1);
+  EXPECT_EQ(some.interfaces[1].first_coordinate, 5);
+  EXPECT_EQ(some.coordinates[11].kind, basis.coordinates[14].kind);
+  EXPECT_EQ(selected(basis, {7, 6, 8, 9, 10, 11}).interfaces[1].first_coordinate, -1);
+}
+
+TEST(CraigBampton, FreeBodyHasSixMotionsWithoutEnergy) {
+  const ReducedBody body = sip().body(with(4));
+  // Rigid motion of both interfaces: exactly in the span, no strain.
+  MatrixXd rigid = MatrixXd::Zero(body.n(), 6);
+  for (const Interface& i : body.interfaces) {
+    const Eigen::Vector3d r = marker(body, i.name).position;
+    rigid.block<3, 3>(i.first_coordinate, 0).setIdentity();
+    rigid.block<3, 3>(i.first_coordinate + 3, 3).setIdentity();
+    for (int k = 0; k < 3; ++k) rigid.block<3, 1>(i.first_coordinate, 3 + k) = Eigen::Vector3d::Unit(k).cross(r);
+  }
+  // Round-off of static shapes: 1e-16 times the condition of K_ii, about 1e5, in the shape; what it stores in K.
+  EXPECT_LT((body.Ke * rigid).norm(), 1e-10 * body.Ke.norm());
+  const VectorXd values = Eigen::SelfAdjointEigenSolver<MatrixXd>(body.Ke).eigenvalues();
+  EXPECT_LT(values.head(6).cwiseAbs().maxCoeff(), 1e-10 * values(15));
+  EXPECT_GT(values(6), 1e-9 * values(15));
+  // And the rigid mass is that of the body.
+  const MatrixXd M_r = rigid.transpose() * body.Me * rigid;
+  EXPECT_NEAR(M_r(0, 0) / body.m, 1, 1e-12);
+  EXPECT_LT((M_r.bottomRightCorner<3, 3>() - body.J0).norm(), 1e-12 * body.J0.norm());
+}
+
+TEST(CraigBampton, StaticTipResponseIsThatOfTheFullModel) {
+  const TwoEnds t = sip();
+  for (const bool orthonormal : {false, true}) {
+    const ReducedBody body = t.body(with(3, "root", orthonormal));
+    EXPECT_EQ(body.frame, "clamped");
+    const Marker& tip = marker(body, "tip");
+    MatrixXd S(6, body.n());
+    S << tip.S, tip.S_theta;
+    const MatrixXd compliance = S * body.Ke.ldlt().solve(S.transpose());
+    const Unknowns left = unknowns(t.boom.mesh, t.boom.assembly.dofs, node_set(t.boom.mesh, "root"));
+    MatrixXd f = MatrixXd::Zero(t.boom.assembly.dofs.count, 6);
+    const int first = t.boom.assembly.dofs.of_node(node_set(t.boom.mesh, "tip").front(), 0);
+    f.middleRows<6>(first).setIdentity();
+    const MatrixXd full = test::compliance(t.boom.mesh, t.boom.assembly, left, f);
+    // Entries of one bending plane, extension and torsion have their own scales.
+    for (Index i = 0; i < 6; ++i) {
+      for (Index j = 0; j < 6; ++j)
+        EXPECT_NEAR(compliance(i, j), full(i, j), 1e-10 * std::sqrt(full(i, i) * full(j, j))) << i << " " << j;
+    }
+    // Closed form of the slender bar: L / EA, L / G J.
+    EXPECT_NEAR(full(0, 0) / (0.302 / (67e9 * 7.853981633974483e-5)), 1, 1e-9);
+    EXPECT_NEAR(full(3, 3) / (0.302 / (67e9 / 2.66 * 2 * 4.908738521234052e-10)), 1, 1e-9);
+  }
+}
+
+TEST(CraigBampton, FrequenciesConvergeFromAboveWithTheNumberOfModes) {
+  const TwoEnds t(boom4(BeamTheory::timoshenko, true, 6, 6));
+  const ModalBasis exact = clamped_modes(t.boom.mesh, t.boom.assembly, node_set(t.boom.mesh, "root"),
+                                         {.num_modes = 10, .sigma = {}, .backend = "arpack"});
+  const VectorXd reference = exact.omega / (2 * std::numbers::pi);
+  VectorXd last = VectorXd::Constant(10, 1e300);
+  for (const int modes : {6, 8, 12, 16, 24, 40}) {
+    const VectorXd f = frequencies_hz(t.body(with(modes, "root"))).head(10);
+    for (Index i = 0; i < 10; ++i) {
+      EXPECT_LE(f(i), last(i) * (1 + 1e-12)) << modes << " " << i;       // a larger space: Rayleigh-Ritz
+      EXPECT_GE(f(i), reference(i) * (1 - 1e-11)) << modes << " " << i;  // digits of the full solve
+    }
+    last = f;
+  }
+  EXPECT_LT((last.cwiseQuotient(reference).array() - 1).maxCoeff(), 1e-3);
+}
+
+TEST(CraigBampton, ManyModesReachTheFullModel) {
+  const TwoEnds t(boom4(BeamTheory::timoshenko, true, 2, 4));
+  const int all = unknowns(t.boom.mesh, t.boom.assembly.dofs, node_set(t.boom.mesh, "root")).count;
+  const ModalBasis exact = clamped_modes(t.boom.mesh, t.boom.assembly, node_set(t.boom.mesh, "root"),
+                                         {.num_modes = 6, .sigma = {}, .backend = "dense"});
+  CraigBamptonOptions options = with(all - 6, "root");
+  options.modes.backend = "dense";
+  const VectorXd f = frequencies_hz(t.body(options));
+  ASSERT_EQ(f.size(), all);
+  for (Index i = 0; i < 6; ++i) EXPECT_NEAR(f(i) * 2 * std::numbers::pi / exact.omega(i), 1, 1e-9) << i;
+}
+
+TEST(CraigBampton, OrthonormalCoordinatesAreTheModesOfTheReducedBody) {
+  const TwoEnds t = sip();
+  const ReducedBody plain = t.body(with(8, "root"));
+  const ModalBasis basis = t.basis(with(8, "root", true));
+  const ReducedBody body = reduce(t.boom.mesh, t.boom.assembly, basis, "boom");
+  const VectorXd f = frequencies_hz(plain);
+  for (Index i = 0; i < body.n(); ++i) {
+    EXPECT_NEAR(body.coordinates[static_cast<size_t>(i)].frequency_hz / f(i), 1, 1e-10) << i;
+    for (Index j = 0; j < i; ++j) {
+      EXPECT_LT(std::abs(body.Me(i, j)), 1e-11 * body.m) << i << " " << j;
+      EXPECT_LT(std::abs(body.Ke(i, j)), 1e-9 * std::sqrt(body.Ke(i, i) * body.Ke(j, j))) << i << " " << j;
+    }
+  }
+  EXPECT_EQ(body.coordinates[0].kind, "bending_y");
+  EXPECT_NEAR(marker(body, "tip").S(1, 0), 2, 1e-10);
+  EXPECT_EQ(body.interfaces[0].first_coordinate, -1);
+  for (const BodyCheck& c : check_invariants(body, t.boom.mesh, t.boom.assembly, basis))
+    EXPECT_TRUE(c.passed) << c.name << " " << c.relative_error;
+}
+
+TEST(CraigBampton, InvariantsOfTheFreeBodyAgreeWithIndependentRoutes) {
+  const TwoEnds t = sip();
+  const ModalBasis basis = t.basis(with(4));
+  const ReducedBody body = reduce(t.boom.mesh, t.boom.assembly, basis, "boom");
+  for (const BodyCheck& c : check_invariants(body, t.boom.mesh, t.boom.assembly, basis))
+    EXPECT_TRUE(c.passed) << c.name << " " << c.relative_error;
+}
+
+TEST(CraigBampton, LineMassLeavesOutTheSpinThatNoMassReaches) {
+  const TwoEnds t(boom4(BeamTheory::euler_bernoulli, false));
+  const ModalBasis basis = t.basis(with(2));
+  EXPECT_EQ(basis.Phi.cols(), 12);  // 5 + 5 + 2
+  EXPECT_FALSE(basis.interfaces[0].components[3]);
+  EXPECT_EQ(basis.interfaces[1].first_coordinate, 5);
+  EXPECT_EQ(basis.coordinates[8].direction, "ry");
+}
+
+TEST(CraigBampton, ReferenceNodesStandForFacesOfSolids) {
+  const BeamGeometry g = boom4(BeamTheory::timoshenko, true);
+  SolidOptions options;
+  options.order = 2;
+  options.grading = {.sectors = 1, .rings = 1, .long_elements = 6, .end_layers = 0, .corner_levels = 0};
+  for (const std::string connection : {"rigid", "distributing"}) {
+    Mesh mesh = make_solid_mesh(g, options);
+    const auto ends = place_interfaces(mesh, {{"base", "root", "rigid"}, {"end", "tip", connection}});
+    const Assembly assembly = assemble(mesh);
+    const ModalBasis basis = craig_bampton(mesh, assembly, ends, with(4, "base"));
+    const ReducedBody body = reduce(mesh, assembly, basis, "boom");
+    EXPECT_EQ(body.structure, "solid");
+    ASSERT_EQ(body.n(), 10);
+    const Marker& end = marker(body, "end");
+    EXPECT_LT((end.S.leftCols<3>() - Eigen::Matrix3d::Identity()).norm(), 1e-12) << connection;
+    EXPECT_LT(end.S.rightCols<4>().norm(), 1e-9) << connection;
+    // The mean motion of the face is that of its reference node, whatever the connection.
+    const Marker& face = marker(body, "tip");
+    EXPECT_LT((face.S - end.S).norm(), 1e-10) << connection;
+    EXPECT_LT((face.S_theta - end.S_theta).norm(), 1e-8) << connection;
+    // Static compliance against the full model with the same connection and the same load.
+    InterfaceNode loaded = ends[1];
+    const Unknowns left =
+        unknowns(mesh, assembly.dofs, std::vector<int>{ends[0].node}, kept_freedoms(assembly.dofs, loaded));
+    MatrixXd f = MatrixXd::Zero(assembly.dofs.count, 6);
+    f.middleRows<6>(assembly.dofs.of_node(loaded.node, 0)).setIdentity();
+    const MatrixXd full = test::compliance(mesh, assembly, left, f);
+    MatrixXd S(6, body.n());
+    S << end.S, end.S_theta;
+    const MatrixXd compliance = S * body.Ke.ldlt().solve(S.transpose());
+    for (Index i = 0; i < 6; ++i) EXPECT_NEAR(compliance(i, i) / full(i, i), 1, 1e-10) << connection << " " << i;
+    // A rigid face is stiffer.
+    EXPECT_NEAR(full(1, 1) / (std::pow(0.302, 3) / (3 * 67e9 * 4.908738521234052e-10)), 1, 0.02);
+    for (const BodyCheck& c : check_invariants(body, mesh, assembly, basis))
+      EXPECT_TRUE(c.passed) << connection << " " << c.name << " " << c.relative_error;
+  }
+}
+
+TEST(CraigBampton, ImpossibleInterfacesAreRefused) {
+  const TwoEnds t = sip();
+  const auto refuses = [&t](std::vector<InterfaceNode> interfaces, const CraigBamptonOptions& options,
+                            const std::string& text) {
+    try {
+      craig_bampton(t.boom.mesh, t.boom.assembly, std::move(interfaces), options);
+      ADD_FAILURE() << "accepted: " << text;
+    } catch (const InputError& e) {
+      EXPECT_NE(std::string(e.what()).find(text), std::string::npos) << e.what();
+    }
+  };
+  refuses(t.ends, with(2, "rooot"), "does not exist");
+  const int tip = t.ends[1].node;
+  refuses({{"pin", tip, {true, true, true, false, false, false}}}, with(2), "can still move");
+  refuses({{"a", tip}, {"b", tip}}, with(2), "another interface keeps it too");
+  refuses({{"pin", tip, {true, true, true, false, false, false}}, t.ends[0]}, with(2, "pin"), "does not hold the body");
+  refuses({{"none", tip, {false, false, false, false, false, false}}}, with(2), "keeps no freedom");
+  Mesh mesh = t.boom.mesh;
+  EXPECT_THROW(place_interfaces(mesh, {{"a", "rooot"}}), InputError);
+  EXPECT_THROW(place_interfaces(mesh, {{"a", "root"}, {"a", "tip"}}), InputError);
+}
+
+}  // namespace
+}  // namespace flexboom
