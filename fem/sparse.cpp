@@ -1,6 +1,7 @@
 #include "fem/sparse.hpp"
 
 #include "fem/check.hpp"
+#include "fem/lanes.hpp"
 
 #include <fmt/format.h>
 
@@ -12,30 +13,12 @@ namespace {
 
 using Eigen::Index;
 
-// One version of a function for each generation of processors, chosen when the program starts. Not under sanitizers,
-// which are not ready that early.
-#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__)
-#define FLEXBOOM_FOR_EACH_PROCESSOR [[gnu::target_clones("avx512f", "avx2", "default")]]
-#else
-#define FLEXBOOM_FOR_EACH_PROCESSOR
-#endif
-
 /// A compressed matrix as plain arrays.
 struct Columns {
   Index count;
   const int* start;
   const int* row;
   const double* value;
-};
-
-// Columns side by side: a vector register, or as many as the processor needs for it.
-struct alignas(64) Eight {
-  static constexpr int width = 8;
-  double of [[gnu::vector_size(64)]];
-};
-struct alignas(32) Four {
-  static constexpr int width = 4;
-  double of [[gnu::vector_size(32)]];
 };
 
 /// Y += A X for a few columns kept row by row, so that an entry of A meets a run of neighbours.

@@ -34,8 +34,8 @@ class SparseFactor {
   /// Factorises A (same pattern). @throws NumericalError when a pivot is zero or, of a definite one, not positive.
   void factorise(const SparseMatrix& A);
 
-  /// X = A^-1 B for any number of columns; 12 of them cost what 2 or 3 alone do. X may be B itself. Work space is kept
-  /// from call to call: not for two threads at once.
+  /// X = A^-1 B for any number of columns; of a definite one 16 cost what 2 alone do. X may be B itself. Work space is
+  /// kept from call to call: not for two threads at once.
   void solve(const Eigen::Ref<const Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd> X) const;
 
   /// Number of negative entries of D: the eigenvalues of A below zero (Sylvester). Zero of a definite factor.

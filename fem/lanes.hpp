@@ -1,0 +1,28 @@
+#pragma once
+
+// One version of a function for each generation of processors, chosen when the program starts. Not under sanitizers,
+// which are not ready that early.
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__)
+#define FLEXBOOM_PROCESSORS
+#define FLEXBOOM_FOR_EACH_PROCESSOR [[gnu::target_clones("avx512f", "avx2", "default")]]
+#else
+#define FLEXBOOM_FOR_EACH_PROCESSOR
+#endif
+
+namespace flexboom {
+
+// A row of a few columns side by side: a vector register, or as many as the processor needs for it.
+struct alignas(64) Eight {
+  static constexpr int width = 8;
+  double of [[gnu::vector_size(64)]];
+};
+struct alignas(32) Four {
+  static constexpr int width = 4;
+  double of [[gnu::vector_size(32)]];
+};
+struct alignas(16) Two {
+  static constexpr int width = 2;
+  double of [[gnu::vector_size(16)]];
+};
+
+}  // namespace flexboom
