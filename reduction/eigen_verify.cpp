@@ -14,7 +14,6 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <utility>
 
 namespace flexboom {
 namespace {
@@ -23,7 +22,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index slab = 32;   // columns that are solved for at a time
+constexpr Index slab = 16;   // columns that are solved for at a time
 constexpr Index probes = 6;  // random vectors that look for modes missed
 
 double hertz(double lambda) { return std::sqrt(std::max(0.0, lambda)) / (2 * std::numbers::pi); }
@@ -55,20 +54,13 @@ MatrixXd orthonormalise(const EigenProblem& p, MatrixXd& Phi) {
 }
 
 /// Residual of each pair in the shift-inverted problem: |(K - sigma M)^-1 M phi - phi / (lambda - sigma)|_M (lambda -
-/// sigma), a bound of the relative error of lambda - sigma. Read from the factor that is in place. The columns of
-/// `rider` are solved for on the way.
-VectorXd residuals(const EigenProblem& p, const SparseFactor& shifted, const EigenPairs& pairs, const MatrixXd& M_Phi,
-                   MatrixXd& rider) {
+/// sigma), a bound of the relative error of lambda - sigma. Read from the factor that is in place.
+VectorXd residuals(const EigenProblem& p, const SparseFactor& shifted, const EigenPairs& pairs, const MatrixXd& M_Phi) {
   VectorXd result(pairs.lambda.size());
   for (Index first = 0; first < result.size(); first += slab) {
     const Index width = std::min(slab, result.size() - first);
-    const bool last = first + width == result.size();
-    MatrixXd W(p.K.rows(), width + (last ? rider.cols() : 0));
-    W.leftCols(width) = M_Phi.middleCols(first, width);
-    if (last) W.rightCols(rider.cols()) = rider;
+    MatrixXd W = M_Phi.middleCols(first, width);
     shifted.solve(W, W);
-    if (last) rider = W.rightCols(rider.cols());
-    W.conservativeResize(Eigen::NoChange, width);
     W *= (pairs.lambda.segment(first, width).array() - pairs.summary.sigma).matrix().asDiagonal();
     W -= pairs.Phi.middleCols(first, width);
     const MatrixXd M_W = symmetric_product(p.M, W);
@@ -111,11 +103,12 @@ void sturm_check(const EigenProblem& p, double flops, EigenSummary& s, int expec
                         s.sturm_method);
 }
 
-/// Looks for modes that are missing: X are random vectors that went through the inverse once, and once more here. Their
+/// Looks for modes that are missing, from random vectors outside those found, taken through the inverse twice. Their
 /// Rayleigh quotients are never below the lowest eigenvalue that is missing (Courant-Fischer): one below the last mode
 /// found proves that a mode was missed, none makes it unlikely.
-void probe(const EigenProblem& p, const SparseFactor& shifted, EigenPairs& pairs, const MatrixXd& M_Phi, MatrixXd X,
-           int expected) {
+void probe(const EigenProblem& p, const SparseFactor& shifted, EigenPairs& pairs, const MatrixXd& M_Phi, int expected) {
+  MatrixXd X = symmetric_product(p.M, random_block(p.K.rows(), probes, 424242));
+  shifted.solve(X, X);
   add_product(X, -1, Transposed::no, pairs.Phi, transposed_product(M_Phi, X));
   X.colwise().normalize();
   const MatrixXd M_X = symmetric_product(p.M, X);
@@ -172,17 +165,14 @@ bool verify(const EigenProblem& p, ShiftedFactor& shifted, const EigenOptions& o
   int expected = 0;
   {
     const MatrixXd M_Phi = orthonormalise(p, pairs.Phi);
-    const bool counted = counts(shifted, options.sturm);
-    MatrixXd X(p.K.rows(), 0);
-    if (!counted) X = symmetric_product(p.M, random_block(p.K.rows(), probes, 424242));
-    residual = residuals(p, shifted.factor(), pairs, M_Phi, X);
+    residual = residuals(p, shifted.factor(), pairs, M_Phi);
     s.residual_max = residual.head(wanted).maxCoeff();
     if (!(s.residual_max <= std::max(max_residual, 100 * options.tolerance)))
       throw NumericalError(fmt::format("residual {:.2g} of the modes is too large", s.residual_max));
     s.orthogonality_error = distance_from_identity(transposed_product(pairs.Phi, M_Phi));
     expected = modes_below_gap(pairs, residual, wanted, complete);
     if (expected == 0) return false;
-    if (!counted) probe(p, shifted.factor(), pairs, M_Phi, std::move(X), expected);
+    if (!counts(shifted, options.sturm)) probe(p, shifted.factor(), pairs, M_Phi, expected);
   }
   const double last = pairs.lambda(expected - 1);
   const bool has_next = expected < pairs.lambda.size();
