@@ -83,7 +83,7 @@ ordered_json json_of(const std::vector<ModesBench>& rows) {
 
 }  // namespace
 
-int bench_command(const BenchArguments& a, const CommonOptions& common) {
+int bench_modes_command(const BenchArguments& a, const CommonOptions& common) {
   const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results/bench_modes") : common.out;
   const bool table = !common.json && !common.quiet;
   if (table) print_heading();

@@ -103,7 +103,8 @@ int mesh_command(const MeshArguments&, const CommonOptions&);
 int reduce_command(const ReduceArguments&, const CommonOptions&);
 int inspect_command(const std::filesystem::path& body, const CommonOptions&);
 int export_command(const ExportArguments&, const CommonOptions&);
-int bench_command(const BenchArguments&, const CommonOptions&);
+int bench_modes_command(const BenchArguments&, const CommonOptions&);
+int bench_reduction_command(const BenchArguments&, const CommonOptions&);
 int compare_command(const CompareArguments&, const CommonOptions&);
 int report_command(const std::filesystem::path& folder, const CommonOptions&);
 

@@ -156,10 +156,13 @@ struct CommandLine {
   }
 
   void add_bench() {
-    CLI::App* c = command("bench", "speed against error, measured: modes");
-    c->add_option("WHAT", bench.what, "modes")->required()->check(CLI::IsMember({"modes"}));
+    CLI::App* c = command("bench", "speed against error, measured: modes, reduction");
+    c->add_option("WHAT", bench.what, "modes or reduction")->required()->check(CLI::IsMember({"modes", "reduction"}));
     c->add_option("--longest", bench.longest, "Leave out models that would take longer than this [s]");
-    c->callback([this] { action = [this] { return bench_command(bench, common); }; });
+    c->callback([this] {
+      const auto command = bench.what == "modes" ? bench_modes_command : bench_reduction_command;
+      action = [this, command] { return command(bench, common); };
+    });
   }
 
   static void add_model_options(CLI::App* c, ModelOptions& options) {
