@@ -3,7 +3,6 @@
 #include "fem/blas_threads.hpp"
 #include "fem/solid_boom.hpp"
 #include "fem/stopwatch.hpp"
-#include "reduction/eigen_shift.hpp"
 #include "reduction/geometric_stiffness.hpp"
 #include "reduction/geometric_stiffness_loads.hpp"
 #include "reduction/inertia_invariants.hpp"
@@ -121,12 +120,10 @@ double hinged_hz(const ReducedBody& body) {
   return std::sqrt(solver.eigenvalues()(1)) / (2 * std::numbers::pi);
 }
 
-/// Tip deflection along y under a unit force there [m/N]; of the full model by the factor of K.
-double tip_compliance(const Mesh& mesh, const Assembly& assembly, const Unknowns& left, const SparseFactor& factor) {
+/// Tip deflection along y under a unit force there [m/N]; of the full model.
+double tip_compliance(const Mesh& mesh, const Assembly& assembly, const Unknowns& left, const StaticSolver& statics) {
   const MatrixXd f = left.reduced_loads(marker_forces(mesh, assembly.dofs, "tip").col(1));
-  MatrixXd x(f.rows(), 1);
-  factor.solve(f, x);
-  return f.col(0).dot(x.col(0));
+  return f.col(0).dot(statics.loaded(f).col(0));
 }
 double tip_compliance(const ReducedBody& body) {
   const VectorXd s = marker(body, "tip").S.row(1);
@@ -261,7 +258,7 @@ class Bench {
     const Mesh& mesh;
     const Assembly& assembly;
     Clamp clamp;
-    const SparseFactor& factor;
+    const StaticSolver& statics;
     double compliance;  // of the full model [m/N]
     double hinged_hz;
   };
@@ -279,12 +276,8 @@ class Bench {
     const Assembly assembly = assemble(mesh, threads_);
     const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
     if (too_long(left.count)) return false;
-    const SparseMatrix K = left.reduced(assembly.K);
-    const SparseMatrix no_mass(K.rows(), K.cols());
-    ShiftedFactor factor({K, no_mass});
-    factor.move_to(0);
-    const Model model{
-        mesh, assembly, clamp, factor.factor(), tip_compliance(mesh, assembly, left, factor.factor()), hinged_hz(mesh)};
+    const StaticSolver statics(left.reduced(assembly.K), {});
+    const Model model{mesh, assembly, clamp, statics, tip_compliance(mesh, assembly, left, statics), hinged_hz(mesh)};
     last_seconds_ = 0;
     last_unknowns_ = left.count;
     const ReductionBench blank{.family = family, .model = name, .unknowns = left.count};
@@ -312,7 +305,7 @@ class Bench {
     row.modes_seconds =
         fastest([&] { basis = modes_of(model.mesh, model.assembly, model.clamp, row.modes, row.threads); });
     row.reduce_seconds = fastest([&] { body = reduce(model.mesh, model.assembly, basis, "boom 4", row.threads); });
-    const GeometricOptions loads{.markers = {"tip"}, .threads = row.threads, .factor = &model.factor};
+    const GeometricOptions loads{.markers = {"tip"}, .threads = row.threads, .statics = &model.statics};
     row.stiffening_seconds =
         fastest([&] { geometric_stiffness(model.mesh, model.assembly, model.clamp, basis.Phi, loads); });
     row.memory_mb = peak_mb();

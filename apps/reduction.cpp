@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 namespace flexboom {
@@ -214,12 +215,17 @@ ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int thread
     if (i.name == a.reference) held.nodes.push_back(i.node);
   }
   const bool flies = body.frame == "clamped" || body.frame == "mean-axis";
+  std::optional<StaticSolver> statics;  // one factorisation for the stiffening and the certificate
+  if (body.frame == "clamped" && body.n() > 0)
+    statics.emplace(unknowns(model.mesh, m.assembly.dofs, held).reduced(m.assembly.K), std::vector<int>{});
+  const StaticSolver* held_statics = statics ? &*statics : nullptr;
   if (a.stiffening && flies && body.n() > 0) {
-    body.Kg = geometric_stiffness(model.mesh, m.assembly, held, basis.Phi,
-                                  {.markers = loaded_markers(body, model.mesh), .threads = threads, .factor = nullptr});
+    body.Kg =
+        geometric_stiffness(model.mesh, m.assembly, held, basis.Phi,
+                            {.markers = loaded_markers(body, model.mesh), .threads = threads, .statics = held_statics});
   }
   apply_damping(body, damping);
-  body.certificate = certificate(body, model.mesh, m.assembly, held, basis, exact_markers(a), threads);
+  body.certificate = certificate(body, model.mesh, m.assembly, held, basis, exact_markers(a), threads, held_statics);
   body.provenance = {fmt::format("flexboom {}", version), libraries(), a.model, mesh_hash(model.mesh),
                      options_text(a, eigen_options(model, a))};
   body.validate();

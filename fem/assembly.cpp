@@ -148,8 +148,8 @@ Assembly assemble(const Mesh& mesh, int threads) {
   mesh.validate();
   DofMap dofs = number_dofs(mesh);
   const EntityGraph graph = entity_graph(mesh, dofs);
-  PatternMatrix K(graph, Coupling::full);
-  PatternMatrix M(graph, Coupling::by_component);
+  PatternMatrix K(graph, Coupling::full, threads);
+  PatternMatrix M(graph, Coupling::by_component, threads);
   bool has_beams = false;
   for (const Element& element : mesh.elements) has_beams = has_beams || type_of(element).shape == Shape::line;
   for (const std::vector<int>& group : independent_groups(mesh, dofs)) {

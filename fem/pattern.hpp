@@ -30,7 +30,7 @@ enum class Coupling { full, by_component };
 class PatternMatrix {
  public:
   /// @throws InputError when the matrix has more entries than an int counts.
-  PatternMatrix(const EntityGraph&, Coupling);
+  PatternMatrix(const EntityGraph&, Coupling, int threads = 1);
 
   /// Adds the lower triangle of an element matrix with the first `node_freedoms` of each node and all internal
   /// freedoms. Two elements without a common entity can be added at once.

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 namespace flexboom {
 namespace {
@@ -112,20 +113,18 @@ void add_rigid_energy(std::vector<BodyCheck>& checks, const Mesh& mesh, const As
 }
 
 /// Displacements of unit forces at a marker by the body and by the full model.
-void add_static_response(std::vector<BodyCheck>& checks, const ReducedBody& body, const Mesh& mesh,
-                         const Assembly& assembly, const Clamp& clamp, const std::vector<std::string>& exact_at,
+void add_static_response(std::vector<BodyCheck>& checks, const ReducedBody& body, const Mesh& mesh, const DofMap& dofs,
+                         const Unknowns& left, const StaticSolver& statics, const std::vector<std::string>& exact_at,
                          int threads) {
-  const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
-  const StaticSolver solver(left.reduced(assembly.K), {});
   const Eigen::LDLT<MatrixXd> Ke(body.Ke);
   constexpr std::array axes = {'x', 'y', 'z'};
   for (const Marker& marker : body.markers) {
     const auto set = mesh.node_sets.find(marker.name);
     if (set == mesh.node_sets.end()) continue;
-    const MatrixXd f = mean_motion(mesh, assembly.dofs, set->second).loads(assembly.dofs.count).leftCols<3>();
-    const MatrixXd u = left.expanded(solver.loaded(left.reduced_loads(f)));
+    const MatrixXd f = mean_motion(mesh, dofs, set->second).loads(dofs.count).leftCols<3>();
+    const MatrixXd u = left.expanded(statics.loaded(left.reduced_loads(f)));
     // 2 f^T u - u^T K u with the energy summed over strain points has the square of the error of u.
-    const MatrixXd full = f.transpose() * u + u.transpose() * f - reduced_stiffness(mesh, assembly.dofs, u, threads);
+    const MatrixXd full = f.transpose() * u + u.transpose() * f - reduced_stiffness(mesh, dofs, u, threads);
     const MatrixXd own = marker.S * Ke.solve(marker.S.transpose());
     const bool exact = std::ranges::find(exact_at, marker.name) != exact_at.end();
     for (int c = 0; c < 3; ++c) {
@@ -156,11 +155,15 @@ std::vector<BodyCheck> body_checks(const ReducedBody& body) {
 
 std::vector<BodyCheck> certificate(const ReducedBody& body, const Mesh& mesh, const Assembly& assembly,
                                    const Clamp& clamp, const ModalBasis& basis,
-                                   const std::vector<std::string>& exact_at, int threads) {
+                                   const std::vector<std::string>& exact_at, int threads, const StaticSolver* statics) {
   std::vector<BodyCheck> checks = check_invariants(body, mesh, assembly, basis, round_off);
   add_rigid_energy(checks, mesh, assembly, threads);
-  if (body.n() > 0 && body.frame == "clamped")
-    add_static_response(checks, body, mesh, assembly, clamp, exact_at, threads);
+  if (body.n() > 0 && body.frame == "clamped") {
+    const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
+    std::optional<StaticSolver> own;
+    if (statics == nullptr) statics = &own.emplace(left.reduced(assembly.K), std::vector<int>{});
+    add_static_response(checks, body, mesh, assembly.dofs, left, *statics, exact_at, threads);
+  }
   const std::vector<BodyCheck> own = body_checks(body);
   checks.insert(checks.end(), own.begin(), own.end());
   return checks;

@@ -3,6 +3,7 @@
 #include "fem/constraints.hpp"
 #include "reduction/modal_basis.hpp"
 #include "reduction/reduced_body.hpp"
+#include "reduction/static_shapes.hpp"
 
 #include <string>
 #include <vector>
@@ -18,8 +19,10 @@ std::vector<BodyCheck> body_checks(const ReducedBody&);
 /// motions, the response to unit forces at its markers against the full model (`clamp` is what the basis was made with;
 /// a reduced body is never softer, and how much stiffer it is says what its modes leave out), and body_checks.
 /// `exact_at`: markers whose static response the basis holds (attachment modes, interfaces), to be equal to 1e-8.
+/// `statics`: of K over the unknowns that the clamp leaves, where the caller has it.
 std::vector<BodyCheck> certificate(const ReducedBody&, const Mesh&, const Assembly&, const Clamp&, const ModalBasis&,
-                                   const std::vector<std::string>& exact_at = {}, int threads = 1);
+                                   const std::vector<std::string>& exact_at = {}, int threads = 1,
+                                   const StaticSolver* statics = nullptr);
 
 /// SHA-256 of nodes, elements, properties, bodies, supports, connections and sets: 64 hexadecimal digits.
 std::string mesh_hash(const Mesh&);

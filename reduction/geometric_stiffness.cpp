@@ -2,8 +2,8 @@
 
 #include "fem/check.hpp"
 #include "fem/parallel.hpp"
-#include "reduction/eigen_shift.hpp"
 #include "reduction/geometric_stiffness_loads.hpp"
+#include "reduction/static_shapes.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Dense>
@@ -21,22 +21,6 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-/// T^T F: loads on the unknowns from loads on all freedoms.
-MatrixXd restricted(const Unknowns& left, const MatrixXd& F) {
-  MatrixXd result = F(left.free_dofs(), Eigen::all);
-  if (!left.follower.empty()) result += left.follower_rows.transpose() * F(left.follower, Eigen::all);
-  return result;
-}
-
-MatrixXd solve(const SparseMatrix& K, const MatrixXd& F) {
-  const SparseMatrix no_mass(K.rows(), K.cols());
-  ShiftedFactor factor({K, no_mass});
-  factor.move_to(0);
-  MatrixXd X(F.rows(), F.cols());
-  factor.factor().solve(F, X);
-  return X;
-}
-
 /// Rigid accelerations (6 x loads: translation, rotation about the origin) that loads F on a free body cause; T are its
 /// rigid motions.
 MatrixXd rigid_accelerations(const MatrixXd& F, const MatrixXd& T, const MatrixXd& MT) {
@@ -44,38 +28,13 @@ MatrixXd rigid_accelerations(const MatrixXd& F, const MatrixXd& T, const MatrixX
 }
 
 /// Six unknowns that hold a free body without straining it: the rows of T that are the most independent.
-std::vector<char> pins(const MatrixXd& T) {
+std::vector<int> pins(const MatrixXd& T) {
   const double length = std::sqrt(T.rightCols<3>().squaredNorm() / T.leftCols<3>().squaredNorm());
   MatrixXd scaled = T;
   scaled.rightCols<3>() /= length;
   const Eigen::ColPivHouseholderQR<MatrixXd> qr(scaled.transpose());
-  std::vector<char> pinned(static_cast<size_t>(T.rows()), 0);
-  for (Index i = 0; i < qr.rank(); ++i) pinned[static_cast<size_t>(qr.colsPermutation().indices()(i))] = 1;
-  return pinned;
-}
-
-/// K X = F where the pinned unknowns are zero.
-MatrixXd solve_pinned(const SparseMatrix& K, const MatrixXd& F, const std::vector<char>& pinned) {
-  std::vector<int> kept;
-  std::vector<int> place(pinned.size(), -1);
-  for (size_t i = 0; i < pinned.size(); ++i) {
-    if (pinned[i]) continue;
-    place[i] = static_cast<int>(kept.size());
-    kept.push_back(static_cast<int>(i));
-  }
-  std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(static_cast<size_t>(K.nonZeros()));
-  for (int j = 0; j < K.outerSize(); ++j) {
-    for (SparseMatrix::InnerIterator it(K, j); it; ++it) {
-      const int row = place[static_cast<size_t>(it.row())], column = place[static_cast<size_t>(j)];
-      if (row >= 0 && column >= 0) entries.emplace_back(row, column, it.value());
-    }
-  }
-  SparseMatrix K_kept(std::ssize(kept), std::ssize(kept));
-  K_kept.setFromTriplets(entries.begin(), entries.end());
-  MatrixXd X = MatrixXd::Zero(F.rows(), F.cols());
-  X(kept, Eigen::all) = solve(K_kept, F(kept, Eigen::all));
-  return X;
+  const auto& order = qr.colsPermutation().indices();
+  return {order.data(), order.data() + qr.rank()};
 }
 
 /// Whether the body is free. @throws InputError when it can move in some ways and not in all.
@@ -103,11 +62,12 @@ void relieve(Statics& statics, const Mesh& mesh, const Assembly& assembly, const
   statics.F -= MT * x;
   statics.fields += inertial_fields().rightCols<6>() * x;  // of -a and -alpha x u0
   const MatrixXd T_left = T(left.free_dofs(), Eigen::all);
-  statics.U0 = left.expanded(solve_pinned(left.reduced(assembly.K), restricted(left, statics.F), pins(T_left)));
+  const StaticSolver pinned(left.reduced(assembly.K), pins(T_left));
+  statics.U0 = left.expanded(pinned.loaded(left.reduced_loads(statics.F)));
 }
 
 Statics statics(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const std::vector<MatrixXd>& loads,
-                const SparseFactor* factor) {
+                const StaticSolver* held) {
   Index count = 0;
   for (const MatrixXd& part : loads) count += part.cols();
   Statics result{MatrixXd(assembly.dofs.count, count), LinearFields::Zero(12, count), {}};
@@ -121,13 +81,8 @@ Statics statics(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, 
     relieve(result, mesh, assembly, left);
     return result;
   }
-  MatrixXd X = restricted(left, result.F);
-  if (factor != nullptr) {
-    factor->solve(X, X);
-  } else {
-    X = solve(left.reduced(assembly.K), X);
-  }
-  result.U0 = left.expanded(X);
+  const MatrixXd f = left.reduced_loads(result.F);
+  result.U0 = left.expanded(held != nullptr ? held->loaded(f) : StaticSolver(left.reduced(assembly.K), {}).loaded(f));
   return result;
 }
 
@@ -171,7 +126,7 @@ GeometricStiffness geometric_stiffness(const Mesh& mesh, const Assembly& assembl
                       assembly.dofs.count));
   std::vector<MatrixXd> loads = {inertial_forces(mesh, assembly)};
   for (const std::string& name : options.markers) loads.push_back(marker_forces(mesh, assembly.dofs, name));
-  const Statics state = statics(mesh, assembly, clamp, loads, options.factor);
+  const Statics state = statics(mesh, assembly, clamp, loads, options.statics);
   const MatrixXd work = prestress_work(mesh, assembly.dofs, state.U0, Phi, options.threads);
   std::vector<MatrixXd> matrices;
   for (Index c = 0; c < work.cols(); ++c) matrices.push_back(unpacked(work.col(c), Phi.cols()));

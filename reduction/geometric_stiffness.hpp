@@ -2,8 +2,8 @@
 
 #include "fem/assembly.hpp"
 #include "fem/constraints.hpp"
-#include "fem/sparse_factor.hpp"
 #include "reduction/reduced_body.hpp"
+#include "reduction/static_shapes.hpp"
 
 #include <string>
 #include <vector>
@@ -15,8 +15,9 @@ struct GeometricOptions {
   /// distributing connection with equal weights).
   std::vector<std::string> markers;
   int threads = 1;
-  /// Of K over the unknowns that the clamp leaves, where the caller has it: factorising anew is most of the work.
-  const SparseFactor* factor = nullptr;
+  /// Of K over the unknowns that the clamp leaves, nothing held beside it, where the caller has it: factorising anew is
+  /// most of the work.
+  const StaticSolver* statics = nullptr;
 };
 
 /// Geometric stiffness of shapes Phi (freedoms x n) from the prestress of unit loads: linear statics of the body held
