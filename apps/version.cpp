@@ -30,6 +30,7 @@ std::string version_text() {
   line("METIS", "", "Apache-2.0");
   if (running.contains("mumps")) line("MUMPS", running["mumps"], "CeCILL-C (sequential)");
   line("pugixml, zlib", "", "MIT, zlib");
+  line("HDF5, matio", "", "BSD-3-Clause, BSD-2-Clause");
   line("BLAS, LAPACK", "", fmt::format("{}; OpenBLAS is BSD-3-Clause", running["blas"]).c_str());
   line("GNU runtime", "", "GPL-3.0+ with the runtime exception (libgomp, libgfortran)");
   line("ARPACK-NG", "3.8", "BSD-3-Clause");
