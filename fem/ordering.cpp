@@ -168,12 +168,14 @@ class Choice {
 
 Ordering fill_reducing_ordering(const SparseMatrix& lower_pattern) {
   const QuotientGraph graph = quotient_graph(lower_pattern);
-  const Levels levels = levels_along(graph);
-  const bool slender = lower_pattern.cols() >= small_problem && levels.count > 4 * slice_levels &&
-                       slenderness(graph, levels) > slender_from;
   Choice choice(graph);
+  if (lower_pattern.cols() < small_problem) {
+    choice.consider("amd", CholmodGraph(graph).amd());
+    return choice.result();
+  }
+  const Levels levels = levels_along(graph);
+  const bool slender = levels.count > 4 * slice_levels && slenderness(graph, levels) > slender_from;
   if (!slender) choice.consider("amd", CholmodGraph(graph).amd());
-  if (lower_pattern.cols() < small_problem) return choice.result();
   choice.consider("rcm", band_order(levels));
   if (choice.dissection_may_pay())
     slender ? choice.consider("slices", slices_order(graph, levels)) : choice.consider("metis", dissection(graph));
