@@ -2,9 +2,9 @@
 
 #include "reduction/body_shapes.hpp"
 #include "reduction/inertia_invariants.hpp"
+#include "reduction/mode_selection.hpp"
 #include "reduction/reduced_matrices.hpp"
 #include "reduction/static_shapes.hpp"
-#include "reduction/tilde.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
@@ -19,9 +19,7 @@ namespace flexboom {
 namespace {
 
 using Eigen::Index;
-using Eigen::Matrix3d;
 using Eigen::MatrixXd;
-using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double round_off = 1e-11;    // of sums over many points, relative to the largest of their kind
@@ -38,13 +36,6 @@ BodyCheck vanishing(std::string name, double size, double limit) {
   return {std::move(name), size, 0, size, size <= limit};
 }
 
-/// Mass matrix of the rigid motions about the BRF origin.
-MatrixXd rigid_mass(const ReducedBody& body) {
-  MatrixXd M(6, 6);
-  M << body.m * Matrix3d::Identity(), -tilde(body.mc0), tilde(body.mc0), body.J0;
-  return M;
-}
-
 bool all_modes(const ReducedBody& body) {
   return std::ranges::all_of(body.coordinates,
                              [](const Coordinate& c) { return c.interface.empty() && c.frequency_hz > 0; });
@@ -55,8 +46,7 @@ void add_bessel(std::vector<BodyCheck>& checks, const ReducedBody& body) {
   for (Index k = 0; k < body.n(); ++k)
     largest = std::max(largest, body.Ct.col(k).squaredNorm() / (body.m * body.Me(k, k)));
   checks.push_back(at_most("Bessel: |Ct_k|^2 / (m Me_kk)", largest, 1, round_off));
-  MatrixXd C(6, body.n());
-  C << body.Ct, body.Cr0;
+  const MatrixXd C = rigid_coupling(body);
   const MatrixXd M = rigid_mass(body);
   // Scaled so that kilograms and their moments weigh alike.
   const VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();

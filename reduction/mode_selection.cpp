@@ -21,19 +21,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-/// L = [Ct; Cr0], 6 x n.
-MatrixXd rigid_coupling(const ReducedBody& body) {
-  MatrixXd L(6, body.n());
-  L << body.Ct, body.Cr0;
-  return L;
-}
-
-Matrix6d rigid_mass(const ReducedBody& body) {
-  Matrix6d M_r;
-  M_r << body.m * Eigen::Matrix3d::Identity(), -tilde(body.mc0), tilde(body.mc0), body.J0;
-  return M_r;
-}
-
 /// The largest shares first until their sum reaches what is wanted; false: it does not.
 bool take_largest(const VectorXd& share, double wanted, std::set<int>& taken) {
   std::vector<int> order(static_cast<size_t>(share.size()));
@@ -53,6 +40,18 @@ void require_fraction(double fraction) {
 }
 
 }  // namespace
+
+MatrixXd rigid_coupling(const ReducedBody& body) {
+  MatrixXd L(6, body.n());
+  L << body.Ct, body.Cr0;
+  return L;
+}
+
+Matrix6d rigid_mass(const ReducedBody& body) {
+  Matrix6d M_r;
+  M_r << body.m * Eigen::Matrix3d::Identity(), -tilde(body.mc0), tilde(body.mc0), body.J0;
+  return M_r;
+}
 
 std::vector<int> modes_in_band(const ReducedBody& body, double low_hz, double high_hz) {
   require(low_hz <= high_hz, fmt::format("modes: the band from {} Hz to {} Hz is empty", low_hz, high_hz));

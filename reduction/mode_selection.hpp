@@ -18,6 +18,11 @@ std::vector<int> modes_in_band(const ReducedBody&, double low_hz, double high_hz
 /// The list, sorted. @throws InputError for an index that does not exist or is given twice.
 std::vector<int> listed_modes(const ReducedBody&, std::vector<int>);
 
+/// Mass matrix of the rigid motions about the BRF origin, and L = [Ct; Cr0] (6 x n) that couples the coordinates with
+/// them.
+Eigen::Matrix<double, 6, 6> rigid_mass(const ReducedBody&);
+Eigen::MatrixXd rigid_coupling(const ReducedBody&);
+
 /// Part of every coordinate in the rigid inertia of the body, 6 x n: L_k^2 / Me_kk with L = (Ct, Cr0): mass along x y z
 /// [kg], inertia about x y z through the BRF origin [kg m^2]. Summed over all modes of a clamped body they are m and
 /// the diagonal of J0 (Hughes, "Modal identities for elastic bodies", J. Appl. Mech. 47, 1980).
