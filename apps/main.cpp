@@ -2,6 +2,7 @@
 #include "apps/version.hpp"
 #include "fem/blas_threads.hpp"
 #include "fem/check.hpp"
+#include "fem/heap.hpp"
 #include "reduction/exports.hpp"
 
 #include <fmt/format.h>
@@ -222,6 +223,7 @@ int run_line(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   restart_with_better_blas_kernels(argv);
+  keep_freed_memory();
   std::signal(SIGPIPE, SIG_IGN);
 #ifdef SIGXFSZ
   std::signal(SIGXFSZ, SIG_IGN);  // a full quota is an error of write(), not a death

@@ -145,7 +145,7 @@ std::vector<int> DofMap::of_element(const Mesh& mesh, int element) const {
 }
 
 Assembly assemble(const Mesh& mesh, int threads) {
-  mesh.validate();
+  mesh.validate(threads);
   DofMap dofs = number_dofs(mesh);
   const EntityGraph graph = entity_graph(mesh, dofs);
   PatternMatrix K(graph, Coupling::full, threads);

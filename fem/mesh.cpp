@@ -2,6 +2,7 @@
 
 #include "fem/check.hpp"
 #include "fem/element.hpp"
+#include "fem/parallel.hpp"
 #include "fem/validation.hpp"
 
 #include <fmt/format.h>
@@ -137,13 +138,24 @@ void validate_properties(const Mesh& mesh) {
   }
 }
 
-void validate_content(const Mesh& mesh) {
+/// The first bad element is named, whichever thread meets one first.
+void validate_elements(const Mesh& mesh, int threads) {
+  const auto count = static_cast<int>(mesh.elements.size());
+  try {
+    parallel_for(threads, count, 64, [&](int e) { validate_element(mesh, e); });
+  } catch (const InputError&) {
+    for (int e = 0; e < count; ++e) validate_element(mesh, e);
+    throw;
+  }
+}
+
+void validate_content(const Mesh& mesh, int threads) {
   for (Index i = 0; i < mesh.nodes.cols(); ++i) {
     require(mesh.nodes.col(i).allFinite(),
             fmt::format("node {} has a coordinate that is not finite", mesh.node_label(static_cast<int>(i))));
   }
   validate_properties(mesh);
-  for (int e = 0; e < std::ssize(mesh.elements); ++e) validate_element(mesh, e);
+  validate_elements(mesh, threads);
   validate_connections(mesh);
   for (size_t i = 0; i < mesh.bodies.size(); ++i) {
     within(fmt::format("bodies[{}]", i), [&] {
@@ -194,9 +206,9 @@ long Mesh::element_label(int element) const {
   return element_labels.empty() ? element : element_labels[static_cast<size_t>(element)];
 }
 
-void Mesh::validate() const {
+void Mesh::validate(int threads) const {
   require(nodes.cols() > 0 && !elements.empty(), "mesh: has no elements");
-  within("mesh", [this] { validate_content(*this); });
+  within("mesh", [&] { validate_content(*this, threads); });
 }
 
 const std::vector<int>& node_set(const Mesh& mesh, const std::string& name) {

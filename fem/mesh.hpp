@@ -104,7 +104,7 @@ struct Mesh {
 
   /// @throws InputError on a missing node, a node that nothing uses, a beam of zero length, an inverted solid, a
   /// missing material, a connection of nothing.
-  void validate() const;
+  void validate(int threads = 1) const;
 };
 
 /// Nodes of a set. @throws InputError naming the sets that exist.

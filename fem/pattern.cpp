@@ -126,6 +126,12 @@ PatternMatrix::PatternMatrix(const EntityGraph& graph, Coupling coupling, int th
   });
 }
 
+SparseMatrix PatternMatrix::take() {
+  SparseMatrix result;
+  result.swap(matrix_);  // Eigen copies a sparse matrix that is moved
+  return result;
+}
+
 void PatternMatrix::add_diagonal(int entity, const Eigen::Ref<const Eigen::MatrixXd>& lower) {
   const bool only_diagonal = thin(entity, entity);
   const auto size = static_cast<int>(lower.rows());

@@ -36,7 +36,7 @@ class PatternMatrix {
   /// freedoms. Two elements without a common entity can be added at once.
   void add(const std::vector<int>& entities, int node_freedoms, const Eigen::MatrixXd& lower);
 
-  SparseMatrix take() { return std::move(matrix_); }
+  SparseMatrix take();
 
  private:
   bool thin(int a, int b) const;

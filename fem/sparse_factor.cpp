@@ -2,15 +2,14 @@
 
 #include "fem/blas_threads.hpp"
 #include "fem/check.hpp"
+#include "fem/heap.hpp"
 #include "fem/ordering.hpp"
 #include "fem/stopwatch.hpp"
 #include "fem/supernodal_solve.hpp"
+#include "fem/supernode_panels.hpp"
 
 #include <cholmod.h>
 #include <fmt/format.h>
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
 
 #include <algorithm>
 #include <cmath>
@@ -69,6 +68,8 @@ class PermutedMatrix {
   std::vector<double> value_;
 };
 
+constexpr int panel_width = 256;  // as fast as any from 192 on, and less memory than wider ones
+
 cholmod_dense view(Eigen::MatrixXd& B) {
   cholmod_dense result{};
   result.nrow = static_cast<size_t>(B.rows());
@@ -90,14 +91,6 @@ void check_status(const cholmod_common& common, const char* what) {
                            ? "a pivot is zero: the matrix is singular; use another shift or clamp"
                            : "CHOLMOD failed";
   throw NumericalError(fmt::format("{}: {} (CHOLMOD status {})", what, reason, common.status));
-}
-
-/// What an analysis and a factorisation used and freed goes back to the system: before the factor, the largest block of
-/// all, is made, and before the vectors that are solved for.
-void return_free_memory() {
-#ifdef __GLIBC__
-  malloc_trim(0);
-#endif
 }
 
 }  // namespace
@@ -243,6 +236,7 @@ SparseFactor::SparseFactor(const SparseMatrix& pattern, FactorKind kind) : impl_
   impl_->entries = pattern.nonZeros();
   impl_->L = cholmod_analyze(&A, &impl_->common);
   check_status(impl_->common, "sparse analysis");
+  if (kind == FactorKind::definite) split_into_panels(*impl_->L, panel_width, impl_->common);
   impl_->summary.ordering = order.name;
   impl_->summary.flops = order.flops;
   impl_->summary.nonzeros = static_cast<long>(order.nonzeros);
@@ -262,10 +256,10 @@ void SparseFactor::factorise(const SparseMatrix& A) {
   {
     PermutedMatrix permuted(A, impl_->place, true);
     cholmod_sparse a = permuted.view();
-    return_free_memory();
+    return_freed_memory();
     cholmod_factorize(&a, impl_->L, &impl_->common);
   }
-  return_free_memory();
+  return_freed_memory();
   if (impl_->common.status == CHOLMOD_NOT_POSDEF && impl_->kind == FactorKind::definite) impl_->require_definite();
   check_status(impl_->common, "sparse factorisation");
   impl_->check_pivots();

@@ -57,6 +57,32 @@ TEST(SparseFactor, ADefiniteFactorRefusesWhatIsNot) {
   EXPECT_LT((scale.asDiagonal() * (x - ones)).norm(), 1e-11 * scale.norm());
 }
 
+// Two dense parts that a third couples: the factor has wide blocks, which are kept as panels with less of the square
+// above their triangles.
+TEST(SparseFactor, WideBlocksAreKeptAsPanels) {
+  constexpr Index part = 400, n = 3 * part;
+  std::srand(5);
+  MatrixXd dense = MatrixXd::Random(n, n);
+  dense = (dense + dense.transpose()).eval() / 2;
+  dense.block(part, 0, part, part).setZero();
+  dense.block(0, part, part, part).setZero();
+  dense.diagonal().array() += 2 * std::sqrt(static_cast<double>(n));
+  const SparseMatrix A = MatrixXd(dense.triangularView<Eigen::Lower>()).sparseView();
+  SparseFactor factor(A, FactorKind::definite);
+  const MatrixXd exact = MatrixXd::Random(n, 13), b = dense * exact;
+  for (int round = 0; round < 2; ++round) {  // the second reuses all
+    factor.factorise(A);
+    for (const int columns : {1, 2, 13}) {
+      MatrixXd x(n, columns);
+      factor.solve(b.leftCols(columns), x);
+      EXPECT_LT((x - exact.leftCols(columns)).norm(), 1e-13 * exact.leftCols(columns).norm());  // condition 3
+    }
+  }
+  const auto entries = static_cast<double>(factor.nonzeros());
+  EXPECT_EQ(entries, 2 * part * (part + 1) / 2 + part * (part + 1) / 2 + 2 * part * part);
+  EXPECT_LT(factor.summary().bytes, 8 * 1.22 * entries);  // 1.43 with a square for each block
+}
+
 // Sylvester: negative pivots of K - s M are the eigenvalues below s. The same analysis serves every shift.
 TEST(SparseFactor, CountsEigenvaluesBelowAShift) {
   SparseMatrix M;
