@@ -244,19 +244,9 @@ double largest(const std::vector<OutputDifference>& differences) {
 
 namespace {
 
-/// Adams keeps the energy of undamped motion at high order; with damping the equations are stiff (README of dynamics)
-/// and need BDF.
-std::string chosen_method(const Scene& scene, const System& system) {
-  if (scene.integrator != "auto") return scene.integrator;
-  const bool damped = std::any_of(system.appendages().begin(), system.appendages().end(), [](const Appendage& a) {
-    return a.hinge.mechanism.damping > 0 || (a.body.n() > 0 && a.body.De.cwiseAbs().maxCoeff() > 0);
-  });
-  return damped ? "bdf" : "adams";
-}
-
-IntegratorOptions integrator_options(const Scene& scene, const System& system, const RunHooks& hooks) {
+IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks) {
   IntegratorOptions o;
-  o.method = chosen_method(scene, system);
+  o.method = scene.integrator == "auto" ? "exponential" : scene.integrator;
   o.tolerance = scene.tolerance;
   o.duration = scene.duration;
   o.output_step = scene.output_step;
@@ -276,7 +266,7 @@ Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_ste
   const Flyable f = make_system(scene, r.bodies);
   r.prepare_seconds = start.seconds();
   const Stopwatch flight;
-  IntegratorOptions options = integrator_options(scene, f.system, hooks);
+  IntegratorOptions options = integrator_options(scene, hooks);
   if (max_steps > 0) options.max_steps = max_steps;
   r.motion = integrate(f.system, f.y0, options);
   r.integrate_seconds = flight.seconds();
@@ -308,8 +298,7 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
                                h.hinge.mechanism.damping, h.hinge.mechanism.stop_stiffness));
   plan.push_back(
       fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
-                  run.motion.summary.method, scene.integrator == "auto" ? "by the damping of the scene" : "as asked",
-                  scene.tolerance));
+                  run.motion.summary.method, scene.integrator == "auto" ? "chosen" : "as asked", scene.tolerance));
   plan.emplace_back("geometric stiffness: left out, its size is error_budget.linearisation");
   if (scene.orbit)
     plan.push_back(

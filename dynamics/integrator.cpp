@@ -1,6 +1,7 @@
 #include "dynamics/integrator.hpp"
 
 #include "dynamics/cvode.hpp"
+#include "dynamics/exponential.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
@@ -20,7 +21,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::array<IntegratorMethod, 2> methods = {{
+constexpr std::array<IntegratorMethod, 3> methods = {{
+    {"exponential", "exact in the linear part, collocation of order 8 in the rest", 0.1, make_exponential},
     {"bdf", "CVODE backward differentiation, order 1-5, Newton with the exact Jacobian", 0.005, make_cvode_bdf},
     {"adams", "CVODE Adams-Moulton, order 1-12, Newton with the exact Jacobian", 0.001, make_cvode_adams},
 }};

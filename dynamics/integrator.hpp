@@ -15,7 +15,7 @@
 namespace flexboom {
 
 struct IntegratorOptions {
-  std::string method = "bdf";
+  std::string method = "exponential";
   double tolerance = 1e-6;    // relative error wanted in every output (max over time / max of the output)
   double duration = 10;       // [s]
   double output_step = 0.01;  // [s]
@@ -104,7 +104,7 @@ struct IntegratorMethod {
   std::unique_ptr<Stepper> (*make)(const System&, const ErrorScale&);
 };
 
-/// The table of methods: "bdf", "adams".
+/// The table of methods: "exponential", "bdf", "adams".
 std::span<const IntegratorMethod> integrator_methods();
 
 }  // namespace flexboom

@@ -241,7 +241,7 @@ class Numerical(Case):
         scene.write_text((MESHES / "sport.toml").read_text().replace("P1 = 0.35", "P1 = 1e300"))
         result = flexboom("run", scene, "--no-budget", "--duration", "0.1", "--out", self.folder / "out")
         self.assert_exit(NUMERICAL, result)
-        self.assertIn("not finite", result.stderr)
+        self.assertIn("Jacobian", result.stderr)
 
 
 class Streams(Case):
@@ -509,7 +509,7 @@ class Interrupted(Case):
         # after two seconds the run, of less than one, is over, and its repeats, tighter and with more modes, go on
         out = self.folder / "out"
         self.interrupt(signal.SIGINT, "run", "sport", "--duration", "0.3", "--tolerance", "1e-10", "--modes", "6",
-                       "--out", out, after=2.0)
+                       "--integrator", "bdf", "--out", out, after=2.0)
         self.assertIsNone(self.summary(out)["error_budget"]["total"])
         self.assertEqual(columns(out / "trajectory.csv")["t"][-1], self.summary(out)["simulated_seconds"])
 

@@ -122,8 +122,8 @@ TEST(PaperFigures, AttitudeIsReportedInTheOrbitFrame) {
 
 TEST(Sport, EnergyAndMomentaBalance) {
   const RunResult& r = first_second();
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-8);  // local errors of 5e-9, damped
-  EXPECT_LT(r.trajectory.summary.momentum_drift, 1e-8);
+  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-7);  // a tenth of the tolerance
+  EXPECT_LT(r.trajectory.summary.momentum_drift, 1e-7);
   EXPECT_GT(column(r, "energy.dissipated").back(), 0.9 * column(r, "energy.elastic").front());
 }
 
@@ -237,7 +237,7 @@ Scene conservative(double duration) {
 
 TEST(Sport, WithoutDampingKeepsEnergyAndMomentum) {
   const RunResult r = run_scene(conservative(1), {});
-  EXPECT_EQ(r.trajectory.summary.method, "adams");
+  EXPECT_EQ(r.trajectory.summary.method, "exponential");
   EXPECT_EQ(column(r, "energy.dissipated").back(), 0);
   EXPECT_LT(r.trajectory.summary.energy_balance, 1e-9);
   EXPECT_LT(r.trajectory.summary.momentum_drift, 1e-11);

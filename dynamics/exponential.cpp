@@ -1,0 +1,473 @@
+#include "dynamics/exponential.hpp"
+
+#include "dynamics/linear_part.hpp"
+#include "dynamics/rotation.hpp"
+#include "dynamics/workspace.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+using Eigen::VectorXd;
+
+constexpr int max_sweeps = 12;
+constexpr double rung = 1.4142135623730951;  // between step sizes
+
+/// d(rotation vector)/dt - omega, omega in body axes (Bortz 1971).
+Vector3d turning(const Vector3d& theta, const Vector3d& omega) {
+  const double a = theta.norm();
+  const double c = a < 1e-2 ? (1 + a * a / 60) / 12 : (1 - 0.5 * a / std::tan(0.5 * a)) / (a * a);
+  return 0.5 * theta.cross(omega) + c * theta.cross(theta.cross(omega));
+}
+
+Vector4d quaternion_of(const Vector3d& theta) {
+  const double half = 0.5 * theta.norm();
+  const double s = half < 1e-4 ? 0.5 * (1 - half * half / 6) : 0.5 * std::sin(half) / half;
+  Vector4d q;
+  q << std::cos(half), s * theta;
+  return q;
+}
+
+class ExponentialStepper final : public Stepper {
+ public:
+  ExponentialStepper(const System& system, const ErrorScale& scale)
+      : system_(system),
+        layout_(system.layout()),
+        scale_(scale),
+        work_(system.workspace()),
+        nx_(layout_.p + layout_.u),
+        y_(VectorXd::Zero(layout_.size)),
+        y_dot_(layout_.size),
+        F_(nx_, points),
+        X_(nx_, points),
+        scaled_coefficients_(collocation::coefficients()) {
+    double factorial = 1;
+    for (int m = 0; m < points; ++m, factorial *= m) {
+      scaled_coefficients_.col(m) *= factorial;
+      middle_[m] = collocation::middle_polynomial()[m] * factorial;
+    }
+    if (!system.fixed_hub()) y_[layout_.attitude()] = 1;
+    if (!(scale.tolerance > 4e-16))
+      throw NumericalError(fmt::format(
+          "exponential: the tolerance asks for {:.2g} of each step, which is below round-off", scale.tolerance));
+  }
+
+  void restart(double t, const VectorXd& y, std::span<const char> contact, std::span<const char> armed) override {
+    t_ = t;
+    pending_ = false;
+    contact_.assign(contact.begin(), contact.end());
+    armed_.assign(armed.begin(), armed.end());
+    linear_ = &linear_part();
+    begin(y);
+    first_ = true;
+    h_ = linear_->step > 0 ? linear_->step : first_step();
+  }
+
+  void step(double t_end, double& t, VectorXd& y, std::span<int> crossed) override {
+    std::ranges::fill(crossed, 0);
+    if (pending_) advance_start();
+    for (;;) {
+      const double left = t_end - t_;
+      const bool last = h_ >= left * (1 - 1e-12);
+      used_ = last ? left : h_;
+      if (last) linear_->grid(used_, spare_);
+      grid_ = last ? &spare_ : &linear_->kept_grid(used_);
+      const double error = solve(left);
+      if (error <= 1) {
+        ++counts_.steps;
+        choose_step(error, last);
+        break;
+      }
+      ++counts_.error_test_failures;
+      if (!(used_ > 1e-14 * std::max(1.0, std::abs(t_))))
+        throw NumericalError(fmt::format("exponential: no step is small enough at t = {:.9g} s", t_));
+      h_ = std::isfinite(error) ? smaller(error) : used_ / (rung * rung);
+      if (!std::isfinite(error)) relinearise();
+    }
+    follow();
+    locate(crossed);
+    state_at(end_, y);
+    t = t_ + end_ * used_;
+    if (end_ == 1 && used_ == t_end - t_) t = t_end;
+    pending_ = true;
+    reached_ = t;
+    reached_state_ = y;
+  }
+
+  void interpolate(double t, VectorXd& y) override { state_at((t - t_) / used_, y); }
+
+  StepCounts counts() const override { return counts_; }
+
+ private:
+  static constexpr int degree = collocation::degree;
+  static constexpr int points = collocation::points;
+  using Matrix3Points = Eigen::Matrix<double, 3, points>;
+  using Points = Eigen::Matrix<double, points, 1>;
+
+  /// The linear part for the stops that are closed, made when first met.
+  LinearPart& linear_part() {
+    auto& place = linear_parts_[contact_];
+    if (!place) place = make_linear_part(VectorXd::Zero(layout_.p));
+    return *place;
+  }
+
+  std::unique_ptr<LinearPart> make_linear_part(const VectorXd& p) {
+    VectorXd y = VectorXd::Zero(layout_.size);
+    y.head(layout_.p) = p;
+    if (!system_.fixed_hub()) y[layout_.attitude()] = 1;
+    system_.jacobian(y.data(), contact_, *work_);
+    ++counts_.jacobian_evaluations;
+    ++counts_.factorisations;
+    MatrixXd J = MatrixXd::Zero(nx_, nx_);
+    J.block(0, layout_.p + layout_.base, layout_.p, layout_.p).setIdentity();
+    J.bottomRows(layout_.u) = work_->dudot;
+    // A coordinate that nothing pulls back (a hinge without a spring) has no two eigenvectors of its own. With a period
+    // of two hours in L it has; the remainder takes the difference.
+    constexpr double pull = 1e-6;
+    for (int i = 0; i < layout_.p; ++i)
+      if (J.col(i).cwiseAbs().maxCoeff() < pull) J(layout_.p + layout_.base + i, i) -= pull;
+    return std::make_unique<LinearPart>(std::move(J), work_->dahub, system_.fixed_hub() ? -1 : layout_.p, p);
+  }
+
+  void relinearise() {
+    const VectorXd p = start_.head(layout_.p);
+    if ((linear_->base - p).norm() <= 1e-3 * std::max(linear_->base.norm(), p.norm())) return;
+    linear_parts_[contact_] = make_linear_part(p);
+    linear_ = linear_parts_[contact_].get();
+    begin(start_);
+    first_ = true;
+  }
+
+  double first_step() const {
+    // A tenth of the period of the slowest vibration that is not overdamped; the error test takes it from there.
+    double slowest = 0;
+    for (Index k = 0; k < linear_->lambda.size(); ++k) {
+      const double w = std::abs(linear_->lambda[k].imag());
+      if (w > 1e-3) slowest = slowest == 0 ? w : std::min(slowest, w);
+    }
+    return std::exp2(std::floor(std::log2(slowest > 0 ? 0.6 / slowest : 0.01)));
+  }
+
+  void begin(const VectorXd& y) {
+    const Index m = linear_->size();
+    start_ = y;
+    Z_.resize(m, points);
+    N_.resize(m, points);
+    integral_.resize(m);
+    Z_.col(0).noalias() = linear_->to_modes * y.head(nx_);
+    X_.col(0) = y.head(nx_);
+    evaluate(0);
+    linear_->remainder(F_.leftCols(1), Z_.leftCols(1), N_.leftCols(1));
+  }
+
+  /// The end of the last step is the start of the next.
+  void advance_start() {
+    pending_ = false;
+    t_ = reached_;
+    start_ = reached_state_;
+    Z_.col(0) = Z_.col(degree).eval();
+    X_.col(0) = X_.col(degree).eval();
+    N_.col(0) = N_.col(degree).eval();
+    acceleration_.col(0) = acceleration_.col(degree).eval();
+    power_[0] = power_[degree];
+    first_ = false;
+  }
+
+  /// F, hub acceleration and dissipated power at point j.
+  void evaluate(int j) {
+    y_.head(nx_) = X_.col(j);
+    system_.derivative(y_.data(), contact_, *work_, y_dot_.data());
+    ++counts_.rhs_evaluations;
+    F_.col(j) = y_dot_.head(nx_);
+    power_[j] = y_dot_[layout_.dissipated()];
+    if (!system_.fixed_hub()) acceleration_.col(j) = y_dot_.segment<3>(layout_.velocity());
+  }
+
+  /// Sweeps until the points stand still; returns the error in units of the one allowed, infinite when they do not.
+  double solve(double left) {
+    const Index m = linear_->size();
+    predict();
+    double last_change = 0;
+    for (int sweep = 0; sweep < max_sweeps; ++sweep) {
+      M_.noalias() = used_ * N_ * scaled_coefficients_;
+      for (int j = 1; j < points; ++j) linear_->combine((*grid_)[static_cast<size_t>(j)], 0, Z_.col(0), M_, Z_.col(j));
+      previous_ = X_.col(degree);
+      small_product(linear_->from_modes, Z_.rightCols(degree), X_.rightCols(degree));
+      const double change = sweep == 0 ? std::numeric_limits<double>::infinity() : norm(X_.col(degree) - previous_);
+      if (!std::isfinite(change) && sweep > 0) return change;
+      if (sweep > 1 && change > last_change && change > 1) return std::numeric_limits<double>::infinity();
+      const double ratio = sweep > 1 ? std::min(0.9, change / last_change) : contraction_;
+      if (sweep > 1) contraction_ = std::max(1e-3, ratio);
+      if (sweep > 0 && change * ratio <= 0.1) break;
+      if (sweep + 1 == max_sweeps) return std::numeric_limits<double>::infinity();
+      last_change = change;
+      for (int j = 1; j < points; ++j) evaluate(j);
+      linear_->remainder(F_.rightCols(degree), Z_.rightCols(degree), N_.rightCols(degree));
+    }
+    // What the middle point adds to the interpolation by the others.
+    const Points& d = collocation::middle_difference();
+    error_modes_.noalias() = N_ * d;
+    zero_.setZero(m);
+    z_error_.resize(m);
+    M_error_.noalias() = used_ * error_modes_ * middle_.transpose();
+    linear_->combine((*grid_)[degree], 0, zero_, M_error_, z_error_);
+    double error = norm(linear_->from_modes * z_error_);
+    const double weight = used_ * collocation::middle_polynomial().dot(collocation::integrals(1));
+    const double lost = std::abs(power_.dot(d)) * weight;
+    if (!system_.fixed_hub()) {
+      // What the hub's rate keeps of the error turns it until the end.
+      const double turned = (linear_->drift_modes.lazyProduct(z_error_)).norm() * left;
+      error = std::max(error, turned / (2 * scale_.tolerance * scale_.scale[layout_.attitude()]));
+      const Vector3d pushed = (acceleration_ - linear_->a_hub * X_) * d;  // and its speed carries it away
+      error = std::max(error, pushed.norm() * weight * left / (scale_.tolerance * scale_.scale[layout_.position()]));
+    }
+    error = std::max(error, lost / (scale_.tolerance * scale_.scale[layout_.dissipated()]));
+    return error;
+  }
+
+  double norm(const Eigen::Ref<const VectorXd>& e) const {
+    return (e.array() / (scale_.tolerance * scale_.scale.head(nx_).array())).abs().maxCoeff();
+  }
+
+  /// The remainder at the points of a new step: the polynomial of the last one goes on, or it stays as it is.
+  void predict() {
+    if (first_ || last_used_ <= 0) {
+      for (int j = 1; j < points; ++j) N_.col(j) = N_.col(0);
+      return;
+    }
+    for (int j = 1; j < points; ++j) {
+      const double c = 1 + collocation::node(j) * used_ / last_used_;
+      N_.col(j).noalias() = last_N_ * collocation::monomials(c);
+    }
+  }
+
+  void choose_step(double error, bool last) {
+    last_N_.noalias() = N_ * collocation::coefficients();
+    last_used_ = used_;
+    if (last) return;
+    const double growth = std::pow(std::max(error, 1e-10), -1.0 / (degree + 1));
+    if (growth > 1.25 * rung) h_ = used_ * (growth > 4 ? rung * rung : rung);
+    if (first_) linear_->step = used_;
+  }
+  double smaller(double error) const {
+    double h = used_;
+    for (double left = error; left > 1; left /= std::pow(rung, degree + 1)) h /= rung;
+    return std::exp2(std::round(2 * std::log2(h)) / 2);
+  }
+
+  /// What follows p and u and does not act back: attitude, velocity, position, dissipated energy.
+  void follow() {
+    const auto to_coefficients = collocation::coefficients();
+    power_coefficients_ = to_coefficients.transpose() * power_;
+    if (system_.fixed_hub()) return;
+    Eigen::Matrix<double, 3, points> omega, theta0, theta, C;
+    omega = X_.middleRows<3>(layout_.p);
+    theta0.col(0).setZero();
+    for (int j = 1; j < points; ++j) {
+      linear_->combine((*grid_)[static_cast<size_t>(j)], 1, Z_.col(0), M_, integral_);
+      theta0.col(j).noalias() = used_ * (linear_->omega_modes.lazyProduct(integral_));
+    }
+    theta = theta0;
+    for (int round = 0; round < 20; ++round) {
+      for (int j = 0; j < points; ++j) C.col(j) = turning(theta.col(j), omega.col(j));
+      C_.noalias() = C * to_coefficients;
+      double change = 0;
+      for (int j = 1; j < points; ++j) {
+        const Vector3d next = theta0.col(j) + used_ * (C_ * collocation::integrals(collocation::node(j)));
+        change = std::max(change, (next - theta.col(j)).norm());
+        theta.col(j) = next;
+      }
+      if (change <= 1e-16) break;
+    }
+    for (int j = 0; j < points; ++j) {
+      const Eigen::Matrix3d A = rotation_matrix(quaternion_of(theta.col(j)));
+      G_values_.col(j) = A * acceleration_.col(j) - linear_->a_hub * X_.col(j);
+    }
+    G_.noalias() = G_values_ * to_coefficients;
+  }
+
+  /// The state at a fraction c of the step.
+  void state_at(double c, VectorXd& y) {
+    const GridPoint* at = &(*grid_)[degree];
+    if (c != 1) linear_->point(c, used_, scratch_), at = &scratch_;
+    y.resize(layout_.size);
+    linear_->combine(*at, 0, Z_.col(0), M_, integral_);
+    small_product(linear_->from_modes, integral_, y.head(nx_));
+    y[layout_.dissipated()] = start_[layout_.dissipated()] + used_ * power_coefficients_.dot(collocation::integrals(c));
+    if (system_.fixed_hub()) return;
+    const auto I = collocation::integrals(c);
+    linear_->combine(*at, 1, Z_.col(0), M_, integral_);
+    const Vector3d theta = used_ * (linear_->omega_modes.lazyProduct(integral_) + C_ * I);
+    const Vector4d attitude = start_.segment<4>(layout_.attitude());
+    const Eigen::Matrix3d A = rotation_matrix(attitude);
+    y.segment<4>(layout_.attitude()) = quaternion_product(attitude, quaternion_of(theta));
+    const Vector3d dv = used_ * (linear_->a_hub_modes.lazyProduct(integral_) + G_ * I);
+    linear_->combine(*at, 2, Z_.col(0), M_, integral_);
+    const Vector3d dr =
+        used_ * used_ * (linear_->a_hub_modes.lazyProduct(integral_) + G_ * collocation::double_integrals(c));
+    const Vector3d v0 = start_.segment<3>(layout_.velocity());
+    y.segment<3>(layout_.velocity()) = v0 + A * dv;
+    y.segment<3>(layout_.position()) = start_.segment<3>(layout_.position()) + c * used_ * v0 + A * dr;
+  }
+
+  /// Distance of a hinge from its stop on the side where its flag says that it is (negative: it has crossed), and the
+  /// change of that per step, at a fraction c.
+  struct Clearance {
+    double c = 0, value = 0, slope = 0;
+  };
+
+  Clearance clearance(int hinge, double c) {
+    linear_->point(c, used_, scratch_);
+    linear_->combine(scratch_, 0, Z_.col(0), M_, integral_);
+    const int at = layout_.body[static_cast<size_t>(hinge)], rate = layout_.p + layout_.base + at;
+    const double side = contact_[static_cast<size_t>(hinge)] ? 1 : -1;
+    return {c, side * linear_->from_modes.row(at).dot(integral_),
+            side * used_ * linear_->from_modes.row(rate).dot(integral_)};
+  }
+
+  Clearance clearance_at_point(int hinge, int j) const {
+    const int at = layout_.body[static_cast<size_t>(hinge)], rate = layout_.p + layout_.base + at;
+    const double side = contact_[static_cast<size_t>(hinge)] ? 1 : -1;
+    return {collocation::node(j), side * X_(at, j), side * used_ * X_(rate, j)};
+  }
+
+  /// Ends the step at the first crossing of an armed stop.
+  void locate(std::span<int> crossed) {
+    roots_.clear();
+    end_ = 1;
+    for (int i = 0; i < static_cast<int>(armed_.size()); ++i) {
+      const double root = armed_[static_cast<size_t>(i)] ? first_crossing(i) : 2;
+      if (root > 1) continue;
+      roots_.emplace_back(i, root);
+      end_ = std::min(end_, root);
+    }
+    const double same = (4e-16 * std::abs(t_) + 1e-14 * used_) / used_;  // booms that are alike cross together
+    for (const auto& [i, root] : roots_)
+      if (root <= end_ + same) crossed[static_cast<size_t>(i)] = contact_[static_cast<size_t>(i)] ? -1 : 1;
+  }
+
+  /// Vibration of a gap that the points of a step are too far apart for.
+  struct Ripple {
+    double turn = 0;       // angle that the fastest of it goes through in a step
+    double amplitude = 0;  // all of it, at the start
+  };
+
+  Ripple ripple(int hinge) const {
+    const Index m = linear_->lambda.size();
+    const int at = layout_.body[static_cast<size_t>(hinge)];
+    const auto amplitude = [&](Index k) {
+      return std::hypot(linear_->from_modes(at, k), linear_->from_modes(at, m + k)) *
+             std::hypot(Z_(k, 0), Z_(m + k, 0));
+    };
+    double fastest = 0;
+    for (Index k = 0; k < m; ++k) fastest = std::max(fastest, std::abs(linear_->lambda[k]) * amplitude(k));
+    Ripple r;
+    for (Index k = 0; k < m; ++k) {
+      const double turn = linear_->lambda[k].imag() * used_;
+      if (turn < 2 || std::abs(linear_->lambda[k]) * amplitude(k) < 0.02 * fastest) continue;  // too slow a part
+      r.turn = std::max(r.turn, turn);
+      r.amplitude += amplitude(k);
+    }
+    return r;
+  }
+
+  /// The first fraction of the step where the gap leaves the side of its flag, or 2.
+  double first_crossing(int i) {
+    const Ripple ripples = ripple(i);
+    Clearance from = clearance_at_point(i, 0);
+    for (int j = 1; j < points; ++j) {
+      const Clearance to = clearance_at_point(i, j);
+      const double start = from.c, width = to.c - start;
+      const bool clear = std::min(from.value, to.value) > 2 * ripples.amplitude;
+      const int parts = clear ? 1 : static_cast<int>(std::clamp(std::ceil(ripples.turn * width), 1.0, 64.0));
+      for (int part = 1; part <= parts; ++part) {
+        const Clearance next = part == parts ? to : clearance(i, start + width * part / parts);
+        const double root = crossing_between(i, from, next);
+        if (root <= 1) return root;
+        if (root > 2) return 2;
+        from = next;
+      }
+    }
+    return 2;
+  }
+
+  /// The first crossing between two places near each other; 2: none, 3: it has been on the wrong side from the start.
+  double crossing_between(int i, const Clearance& from, const Clearance& to) {
+    if (to.value < 0) {
+      if (from.value > 0) return root_between(i, from.c, to.c);
+      if (from.slope <= 0) return 3;
+      for (double c = 0.5 * (from.c + to.c), tries = 0; tries < 60; c = 0.5 * (from.c + c), ++tries)
+        if (clearance(i, c).value > 0) return root_between(i, c, to.c);  // it starts on the stop and comes off
+      return 3;
+    }
+    if (!(from.slope < 0 && to.slope > 0)) return 2;
+    // A dip: the lowest point of the cubic through both values and slopes.
+    const double width = to.c - from.c, d0 = from.slope * width, d1 = to.slope * width;
+    const double c3 = 2 * (from.value - to.value) + d0 + d1, c2 = 3 * (to.value - from.value) - 2 * d0 - d1;
+    const double root = c2 * c2 - 3 * c3 * d0;
+    if (root < 0) return 2;
+    const double s = std::clamp(-d0 / (c2 + std::sqrt(root)), 0.0, 1.0);
+    if (from.value + s * (d0 + s * (c2 + s * c3)) > 0.1 * std::min(from.value, to.value)) return 2;
+    const double lowest = from.c + s * width;
+    return lowest > from.c && clearance(i, lowest).value < 0 ? root_between(i, from.c, lowest) : 2;
+  }
+
+  /// Newton in a bracket: clear at a, crossed at b.
+  double root_between(int i, double a, double b) {
+    double c = b;
+    for (int round = 0; round < 100; ++round) {
+      const Clearance here = clearance(i, c);
+      (here.value < 0 ? b : a) = c;
+      double next = here.slope < 0 ? c - here.value / here.slope : 0.5 * (a + b);
+      if (!(next > a && next < b)) next = 0.5 * (a + b);
+      const double moved = std::abs(next - c);
+      c = next;
+      if (moved <= 4e-16 * std::max(c, std::abs(t_) / used_) || b - a <= 4e-16 * b) break;
+    }
+    return c;
+  }
+
+  const System& system_;
+  const Layout& layout_;
+  const ErrorScale& scale_;
+  WorkspaceHandle work_;
+  int nx_;
+  std::vector<char> contact_, armed_;
+  std::map<std::vector<char>, std::unique_ptr<LinearPart>> linear_parts_;
+  LinearPart* linear_ = nullptr;
+  Grid spare_;
+  const Grid* grid_ = nullptr;
+  GridPoint scratch_;
+
+  double t_ = 0, h_ = 0, used_ = 0, end_ = 1, last_used_ = 0, reached_ = 0, contraction_ = 0.1;
+  bool first_ = true, pending_ = false;
+  VectorXd start_, reached_state_;
+  VectorXd y_, y_dot_, previous_;
+  MatrixXd F_, X_, Z_, N_, M_, last_N_, M_error_;
+  VectorXd error_modes_, z_error_, zero_, integral_;
+  Points power_ = Points::Zero(), power_coefficients_ = Points::Zero();
+  Points middle_ = Points::Zero();
+  collocation::Table scaled_coefficients_;
+  Matrix3Points G_ = Matrix3Points::Zero(), C_ = Matrix3Points::Zero(), G_values_ = Matrix3Points::Zero(),
+                acceleration_ = Matrix3Points::Zero();
+  std::vector<std::pair<int, double>> roots_;
+  StepCounts counts_;
+};
+
+}  // namespace
+
+std::unique_ptr<Stepper> make_exponential(const System& system, const ErrorScale& scale) {
+  return std::make_unique<ExponentialStepper>(system, scale);
+}
+
+}  // namespace flexboom

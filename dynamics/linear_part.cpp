@@ -1,0 +1,186 @@
+#include "dynamics/linear_part.hpp"
+
+#include "dynamics/phi.hpp"
+#include "fem/check.hpp"
+#include "fem/lanes.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+namespace flexboom {
+
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int functions = collocation::degree + 4;  // phi_0 .. phi_(degree + 3)
+
+/// Powers of two D such that rows and columns of D^-1 L D are of one size (Parlett, Reinsch 1969).
+VectorXd balance(MatrixXd& L) {
+  VectorXd D = VectorXd::Ones(L.rows());
+  for (int round = 0; round < 40; ++round) {
+    bool changed = false;
+    for (Index i = 0; i < L.rows(); ++i) {
+      const double d = std::abs(L(i, i));
+      const double row = L.row(i).cwiseAbs().sum() - d, column = L.col(i).cwiseAbs().sum() - d;
+      if (row == 0 || column == 0) continue;
+      const double f = std::exp2(std::round(0.5 * std::log2(row / column)));
+      if (f == 1) continue;
+      L.row(i) /= f;
+      L.col(i) *= f;
+      D[i] *= f;
+      changed = true;
+    }
+    if (!changed) break;
+  }
+  return D;
+}
+
+/// C += A B for `columns` columns of B; A is rows x inner.
+template <int columns>
+[[gnu::always_inline]] inline void add_columns(const double* A, Index rows, Index stride_A, Index inner,
+                                               const double* B, Index stride_B, double* C, Index stride_C) {
+  for (Index k = 0; k < inner; ++k, A += stride_A) {
+    for (int c = 0; c < columns; ++c) {
+      const double b = B[k + c * stride_B];
+      double* const target = C + c * stride_C;
+#pragma GCC ivdep
+      for (Index i = 0; i < rows; ++i) target[i] += b * A[i];
+    }
+  }
+}
+
+FLEXBOOM_FOR_EACH_PROCESSOR
+void product_of_columns(const double* A, Index rows, Index stride_A, Index inner, const double* B, Index stride_B,
+                        Index columns, double* C, Index stride_C) {
+  for (Index c = 0; c < columns; ++c) std::fill_n(C + c * stride_C, rows, 0.0);
+  Index c = 0;
+  for (; c + 4 <= columns; c += 4)
+    add_columns<4>(A, rows, stride_A, inner, B + c * stride_B, stride_B, C + c * stride_C, stride_C);
+  for (; c < columns; ++c)
+    add_columns<1>(A, rows, stride_A, inner, B + c * stride_B, stride_B, C + c * stride_C, stride_C);
+}
+
+/// (zr, zi) = sum over k of b_k times v_k, complex, in halves of m; v_k are the columns z0, M.
+FLEXBOOM_FOR_EACH_PROCESSOR
+void sum_of_products(Index m, Index terms, const double* b, const double* z0, const double* M, double* z) {
+  double* const zr = z;
+  double* const zi = z + m;
+  for (Index k = 0; k <= terms; ++k) {
+    const double* const br = b + 2 * m * k;
+    const double* const bi = br + m;
+    const double* const vr = k == 0 ? z0 : M + 2 * m * (k - 1);
+    const double* const vi = vr + m;
+    if (k == 0) {
+#pragma GCC ivdep
+      for (Index i = 0; i < m; ++i) {
+        zr[i] = br[i] * vr[i] - bi[i] * vi[i];
+        zi[i] = br[i] * vi[i] + bi[i] * vr[i];
+      }
+    } else {
+#pragma GCC ivdep
+      for (Index i = 0; i < m; ++i) {
+        zr[i] += br[i] * vr[i] - bi[i] * vi[i];
+        zi[i] += br[i] * vi[i] + bi[i] * vr[i];
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void small_product(const Eigen::Ref<const MatrixXd>& A, const Eigen::Ref<const MatrixXd>& B, Eigen::Ref<MatrixXd> C) {
+  product_of_columns(A.data(), A.rows(), A.outerStride(), A.cols(), B.data(), B.outerStride(), B.cols(), C.data(),
+                     C.outerStride());
+}
+
+LinearPart::LinearPart(MatrixXd L, MatrixXd a_hub_by_x, int first_omega, VectorXd base_p)
+    : a_hub(std::move(a_hub_by_x)), base(std::move(base_p)) {
+  const VectorXd D = balance(L);
+  const Eigen::EigenSolver<MatrixXd> eigen(L);
+  const MatrixXcd V = eigen.eigenvectors();
+  const MatrixXcd inverse = V.inverse();
+  const double growth = V.cwiseAbs().rowwise().sum().maxCoeff() * inverse.cwiseAbs().rowwise().sum().maxCoeff();
+  if (eigen.info() != Eigen::Success || !(growth < 1e10))
+    throw NumericalError(
+        fmt::format("exponential: the Jacobian has no full set of eigenvectors ({:.2g}); try bdf", growth));
+  std::vector<Index> kept;
+  for (Index k = 0; k < L.rows(); ++k)
+    if (eigen.eigenvalues()[k].imag() >= 0) kept.push_back(k);
+  const auto m = static_cast<Index>(kept.size());
+  lambda.resize(m);
+  from_modes.resize(L.rows(), 2 * m);
+  to_modes.resize(2 * m, L.rows());
+  for (Index i = 0; i < m; ++i) {
+    const Index k = kept[static_cast<size_t>(i)];
+    lambda[i] = eigen.eigenvalues()[k];
+    const double twice = lambda[i].imag() > 0 ? 2 : 1;
+    from_modes.col(i) = twice * D.cwiseProduct(V.col(k).real());
+    from_modes.col(m + i) = -twice * D.cwiseProduct(V.col(k).imag());
+    to_modes.row(i) = inverse.row(k).real().cwiseQuotient(D.transpose());
+    to_modes.row(m + i) = inverse.row(k).imag().cwiseQuotient(D.transpose());
+  }
+  lambda_re_ = lambda.real();
+  lambda_im_ = lambda.imag();
+  if (first_omega < 0) return;
+  omega_modes = from_modes.middleRows<3>(first_omega);
+  a_hub_modes = a_hub * from_modes;
+  drift_modes = omega_modes;
+  for (Index i = 0; i < m; ++i)
+    if (std::abs(lambda[i]) > 1e-9 * L.norm()) drift_modes.col(i).setZero(), drift_modes.col(m + i).setZero();
+}
+
+void LinearPart::remainder(const Eigen::Ref<const MatrixXd>& F, const Eigen::Ref<const MatrixXd>& Z,
+                           Eigen::Ref<MatrixXd> N) const {
+  const Index m = lambda.size();
+  small_product(to_modes, F, N);
+  for (Index c = 0; c < N.cols(); ++c) {
+    const double *re = Z.col(c).data(), *im = re + m;
+    double *n_re = N.col(c).data(), *n_im = n_re + m;
+    for (Index i = 0; i < m; ++i) {
+      n_re[i] -= lambda_re_[i] * re[i] - lambda_im_[i] * im[i];
+      n_im[i] -= lambda_re_[i] * im[i] + lambda_im_[i] * re[i];
+    }
+  }
+}
+
+void LinearPart::point(double c, double h, GridPoint& result) const {
+  const Index m = lambda.size();
+  result.resize(2 * m, functions);
+  std::array<std::complex<double>, functions> phi;
+  for (Index i = 0; i < m; ++i) {
+    phi_functions(c * h * lambda[i], phi);
+    double power = 1;
+    for (Index k = 0; k < functions; ++k, power *= c) {
+      result(i, k) = power * phi[static_cast<size_t>(k)].real();
+      result(m + i, k) = power * phi[static_cast<size_t>(k)].imag();
+    }
+  }
+}
+
+void LinearPart::grid(double h, Grid& g) const {
+  for (int j = 1; j < collocation::points; ++j) point(collocation::node(j), h, g[static_cast<size_t>(j)]);
+}
+
+const Grid& LinearPart::kept_grid(double h) {
+  const auto [place, is_new] = grids_.try_emplace(h);
+  if (is_new) grid(h, place->second);
+  return place->second;
+}
+
+void LinearPart::combine(const GridPoint& b, int shift, const Eigen::Ref<const VectorXd>& z0, const MatrixXd& M,
+                         Eigen::Ref<VectorXd> z) const {
+  sum_of_products(lambda.size(), M.cols(), b.col(shift).data(), z0.data(), M.data(), z.data());
+}
+
+}  // namespace flexboom

@@ -1,0 +1,224 @@
+#include "dynamics/collocation.hpp"
+#include "dynamics/integrator.hpp"
+#include "dynamics/linear_part.hpp"
+#include "dynamics/phi.hpp"
+
+#include "dynamics_testing.hpp"
+#include "fem/check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <numeric>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using Complex = std::complex<double>;
+
+constexpr double pi = std::numbers::pi;
+
+/// (k - 1)! phi_k(w): the integral of its definition by the 5-point Lobatto rule on many pieces.
+Complex phi_by_quadrature(int k, Complex w) {
+  constexpr int pieces = 4000;
+  constexpr double weight[] = {9.0 / 180, 49.0 / 180, 64.0 / 180, 49.0 / 180, 9.0 / 180};
+  Complex sum = 0;
+  for (int piece = 0; piece < pieces; ++piece) {
+    for (int j = 0; j < 5; ++j) {
+      const double s = (piece + collocation::node(j)) / pieces;
+      sum += weight[j] / pieces * std::exp((1 - s) * w) * std::pow(s, k - 1);
+    }
+  }
+  return sum;
+}
+
+// On both sides of |w| = 2, where the series meets the recurrence, and for decay, growth and vibration.
+TEST(Phi, AgreesWithItsIntegral) {
+  for (const Complex w : {Complex(0, 0), Complex(0.3, 0), Complex(0, 1.999), Complex(0, 2.001), Complex(-1.4, 1.4),
+                          Complex(-1.5, 1.5), Complex(-30, 0), Complex(0, 40), Complex(2, 3), Complex(-3, 60)}) {
+    std::array<Complex, 9> phi;
+    phi_functions(w, phi);
+    EXPECT_LT(std::abs(phi[0] - std::exp(w)), 1e-15 * std::abs(std::exp(w)));
+    double factorial = 1;
+    for (int k = 1; k < 9; factorial *= k++) {
+      const Complex exact = phi_by_quadrature(k, w);
+      EXPECT_LT(std::abs(factorial * phi[static_cast<size_t>(k)] - exact), 1e-13 * std::max(1.0, std::exp(w.real())))
+          << k << " at " << w;
+    }
+  }
+}
+
+TEST(Phi, OfManyIsZeroWhereTheDecayIsFast) {
+  std::array<Complex, 8> phi;
+  phi_functions({-1e7, 3}, phi);
+  EXPECT_EQ(phi[0], 0.0);
+  EXPECT_NEAR(phi[1].real(), 1e-7, 1e-20);
+}
+
+TEST(Collocation, HasLobattoPointsAndWeights) {
+  EXPECT_NEAR(collocation::node(1), 0.5 * (1 - std::sqrt(3.0 / 7)), 1e-16);
+  EXPECT_EQ(collocation::node(0), 0);
+  EXPECT_NEAR(collocation::node(2), 0.5, 1e-16);
+  EXPECT_EQ(collocation::node(4), 1);
+  // Order 8: a polynomial of degree 7 is integrated exactly through five points.
+  collocation::Values values;
+  for (int j = 0; j < collocation::points; ++j) values[j] = std::pow(collocation::node(j), 7);
+  const collocation::Values c = collocation::coefficients().transpose() * values;
+  EXPECT_NEAR(c.dot(collocation::integrals(1)), 1.0 / 8, 1e-14);
+}
+
+TEST(Collocation, IntegratesItsPolynomials) {
+  collocation::Values values;
+  for (int j = 0; j < collocation::points; ++j) {
+    const double c = collocation::node(j);
+    values[j] = 3 + c * (-2 + c * (5 + c * (1 - 4 * c)));
+  }
+  const collocation::Values c = collocation::coefficients().transpose() * values;
+  const double x = 0.37;
+  EXPECT_NEAR(c.dot(collocation::monomials(x)), 3 + x * (-2 + x * (5 + x * (1 - 4 * x))), 1e-13);
+  EXPECT_NEAR(c.dot(collocation::integrals(x)), x * (3 + x * (-1 + x * (5.0 / 3 + x * (0.25 - 0.8 * x)))), 1e-13);
+  EXPECT_NEAR(c.dot(collocation::double_integrals(x)),
+              x * x * (1.5 + x * (-1.0 / 3 + x * (5.0 / 12 + x * (0.05 - 4.0 / 30 * x)))), 1e-13);
+  // A cubic says nothing at the middle point that the others do not.
+  for (int j = 0; j < collocation::points; ++j) values[j] = std::pow(collocation::node(j), 3);
+  EXPECT_NEAR(values.dot(collocation::middle_difference()), 0, 1e-15);
+}
+
+// x' = L x + (polynomial): the state and its integrals at a point against those of a long Taylor series.
+TEST(LinearPart, CarriesALinearSystemUnderAPolynomialExactly) {
+  const MatrixXd L{{0, 1, 0}, {-400, -3, 7}, {2, 0, -1e3}};  // a vibration and a decay
+  LinearPart part(L, MatrixXd(3, 0), -1, VectorXd::Zero(1));
+  const VectorXd x0{{0.3, -2, 1}}, force{{0, 5, 0}};  // force * c^2, c = t / h
+  const double h = 0.01;
+  Eigen::MatrixXd M = MatrixXd::Zero(part.size(), collocation::points);
+  M.col(2) = 2 * h * part.to_modes * force;
+  GridPoint point;
+  part.point(0.8, h, point);
+  std::array<VectorXd, 3> got;
+  for (int shift = 0; shift < 3; ++shift) {
+    VectorXd z(part.size());
+    part.combine(point, shift, part.to_modes * x0, M, z);
+    got[static_cast<size_t>(shift)] = part.from_modes * z;
+  }
+  VectorXd term = x0, x = x0, first = 0.8 * x0, second = 0.32 * x0;  // term: the power k of c
+  for (int k = 1; k < 600; ++k) {
+    term = 0.8 * h / k * (L * term).eval();
+    if (k == 3) term += 0.8 * 0.8 * 0.8 * h / 3 * force;
+    x += term;
+    first += term * 0.8 / (k + 1);
+    second += term * 0.64 / ((k + 1) * (k + 2));
+  }
+  // Terms of the series reach 8^8 / 8!.
+  const double tolerance = 1e-12;
+  EXPECT_LT((got[0] - x).norm(), tolerance);
+  EXPECT_LT((got[1] - first).norm(), tolerance);
+  EXPECT_LT((got[2] - second).norm(), tolerance);
+}
+
+TEST(LinearPart, WithoutAFullSetOfEigenvectorsIsRefused) {
+  const MatrixXd jordan{{0, 1}, {0, 0}};
+  EXPECT_THROW(LinearPart(jordan, MatrixXd(3, 0), -1, VectorXd::Zero(1)), NumericalError);
+}
+
+System sport_boom(int modes, double stiffness_scale = 1) {
+  ReducedBody body = eq14::reduced_body(testing::round_boom(0.295, 0.005), modes, eq14::Planes::xy, "boom");
+  apply_damping(body, {"modal", 0.05});
+  Hinge hinge;
+  hinge.mechanism = testing::sport_mechanism(0.35);
+  hinge.mechanism.stiffness *= stiffness_scale;
+  hinge.point = Vector3d(0.05, 0.1, 0.02);
+  ReducedBody hub = rigid_body("hub", 8.5, Vector3d::Zero(), Vector3d(0.13, 0.1, 0.06).asDiagonal());
+  return System(hub, {{body, hinge}});
+}
+
+IntegratorOptions exponential(double tolerance, double duration) {
+  IntegratorOptions o;
+  o.method = "exponential";
+  o.tolerance = tolerance;
+  o.duration = duration;
+  return o;
+}
+
+// A hinge that nothing pulls back, on a free hub: the eigenvectors of L are short of one.
+TEST(Exponential, AHingeWithoutASpringTurnsOn) {
+  const System system = sport_boom(1, 0);
+  State s = system.at_rest({pi / 2 - 0.5});
+  s.rate[0] = -0.3;
+  const VectorXd y0 = system.pack(s);
+  IntegratorOptions o = exponential(1e-9, 3);
+  const Trajectory r = integrate(system, y0, o);
+  o.method = "bdf";
+  const Trajectory reference = integrate(system, y0, o);
+  for (size_t i = 0; i < r.time.size(); ++i) EXPECT_NEAR(r.y[i][0], reference.y[i][0], 2e-8);
+  EXPECT_LT(r.summary.momentum_drift, 1e-8);
+}
+
+// Large angles and rates: the linear part at rest is a poor guide, and the answer is the same.
+TEST(Exponential, AgreesWithBdfFarFromWhereItWasLinearised) {
+  const System system = sport_boom(2);
+  State s = system.at_rest({pi / 2 - 1.2});
+  s.omega = Vector3d(1, -2, 1.5);
+  const VectorXd y0 = system.pack(s);
+  IntegratorOptions o = exponential(1e-9, 2);
+  const Trajectory r = integrate(system, y0, o);
+  o.method = "bdf";
+  const Trajectory reference = integrate(system, y0, o);
+  VectorXd size = VectorXd::Zero(y0.size()), error = size;
+  for (size_t i = 0; i < r.time.size(); ++i) {
+    size = size.cwiseMax(reference.y[i].cwiseAbs());
+    error = error.cwiseMax((r.y[i] - reference.y[i]).cwiseAbs());
+  }
+  EXPECT_LT(error.cwiseQuotient(size).maxCoeff(), 1e-6);  // of the rates of q just after a contact, by bdf
+  EXPECT_EQ(r.events.size(), reference.events.size());
+}
+
+// A coarse tolerance takes steps that are longer than a contact.
+TEST(Exponential, LongStepsMissNoContact) {
+  const System system = sport_boom(2);
+  const VectorXd y0 = system.pack(system.at_rest({pi / 2 - pi / 60}));
+  IntegratorOptions fine = exponential(1e-9, 3);
+  const Trajectory reference = integrate(system, y0, fine);
+  for (const double tolerance : {1e-2, 1e-3, 1e-4}) {
+    IntegratorOptions o = exponential(tolerance, 3);
+    o.settle = 1e-11;
+    const Trajectory r = integrate(system, y0, o);
+    ASSERT_GT(reference.events.size(), 20U);
+    for (size_t k = 0; k < 20; ++k) EXPECT_NEAR(r.events[k].time, reference.events[k].time, tolerance) << k;
+  }
+}
+
+// Clamped modes on a damped hinge: the fastest eigenvalue grows from 5e4 to 1e7 rad/s (FORMULATION 4.1).
+TEST(Exponential, MoreModesDoNotShrinkTheStep) {
+  long steps_with_2 = 0;
+  for (const int modes : {2, 4, 8, 16}) {
+    const System system = sport_boom(modes);
+    const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 - pi / 60})), exponential(1e-4, 3));
+    if (modes == 2) steps_with_2 = r.summary.steps;
+    EXPECT_LT(r.summary.steps, 4 * steps_with_2) << modes;  // more of the vibration is there to be followed
+    EXPECT_LT(r.summary.energy_balance, 1e-4);
+  }
+}
+
+// Interpolated outputs are as good as steps that end there.
+TEST(Exponential, OutputsBetweenStepsAreOfTheSameQuality) {
+  const System system = sport_boom(2);
+  const VectorXd y0 = system.pack(system.at_rest({pi / 2 - pi / 60}));
+  IntegratorOptions o = exponential(1e-8, 0.3);
+  o.output_step = 0.0007;
+  const Trajectory fine = integrate(system, y0, o);
+  VectorXd size = VectorXd::Zero(y0.size());
+  for (const VectorXd& y : fine.y) size = size.cwiseMax(y.cwiseAbs());
+  for (const size_t i : {100U, 211U, 402U}) {
+    IntegratorOptions until = o;
+    until.duration = fine.time[i];
+    const Trajectory r = integrate(system, y0, until);
+    EXPECT_LT((r.y.back() - fine.y[i]).cwiseAbs().cwiseQuotient(size).maxCoeff(), 1e-7) << i;
+  }
+}
+
+}  // namespace
+}  // namespace flexboom
