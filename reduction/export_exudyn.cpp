@@ -189,6 +189,13 @@ Marker marker_of(const std::string& name, const Nodes& nodes, const Eigen::Matri
   return marker;
 }
 
+/// None are an empty array of floats where EXUDYN wrote the file.
+IntegerMatrix triangles_of(const ExudynDictionary& file) {
+  const auto found = file.find("trigList");
+  const auto* none = found == file.end() ? nullptr : std::get_if<Eigen::VectorXd>(&found->second);
+  return none != nullptr && none->size() == 0 ? IntegerMatrix(0, 3) : entry<IntegerMatrix>(file, "trigList");
+}
+
 void read_nodes(ReducedBody& body, const ExudynDictionary& file) {
   const auto& x = entry<Eigen::VectorXd>(file, "xRef");
   require(x.size() % 3 == 0, "entry \"xRef\" must have three numbers per node");
@@ -206,7 +213,7 @@ void read_nodes(ReducedBody& body, const ExudynDictionary& file) {
   }
   body.display.points = nodes.points.leftCols(shown);
   for (Index i = 0; i < shown; ++i) body.display.S.emplace_back(nodes.shapes.middleRows<3>(3 * i));
-  const auto& triangles = entry<IntegerMatrix>(file, "trigList");
+  const IntegerMatrix triangles = triangles_of(file);
   require(triangles.rows() == 0 || (triangles.cols() == 3 && triangles.minCoeff() >= 0 && triangles.maxCoeff() < shown),
           "\"trigList\" names a node that is none");
   for (Index i = 0; i < triangles.rows(); ++i) {
@@ -261,6 +268,10 @@ std::vector<std::string> exudyn_cannot_hold(const ReducedBody& body) {
   if (!Kg.spin.empty() || !Kg.acceleration.empty() || !Kg.angular_acceleration.empty() || !Kg.markers.empty()) {
     sentences.emplace_back(
         "Geometric stiffness: ObjectFFRFreducedOrder has none, so the body softens under spin instead of stiffening.");
+  }
+  if (!body.Ct.isZero(1e-9 * std::sqrt(body.m * body.Me.diagonal().maxCoeff()))) {
+    sentences.emplace_back(
+        "Gravity: LoadMassProportional acts in the mass centre of the undeformed body, so it turns a deflected one.");
   }
   if (!body.markers.empty()) {
     sentences.emplace_back(

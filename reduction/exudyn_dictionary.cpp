@@ -2,13 +2,13 @@
 
 #include "fem/check.hpp"
 #include "fem/files.hpp"
+#include "reduction/body_file_hdf5.hpp"
 
 #include <hdf5.h>
 
 #include <array>
 #include <cstdint>
 #include <span>
-#include <utility>
 
 namespace flexboom {
 namespace {
@@ -18,64 +18,37 @@ using IntegerRowMajor = Eigen::Matrix<long, Eigen::Dynamic, Eigen::Dynamic, Eige
 
 void check(bool condition, const std::string& what) { require(condition, "HDF5: cannot " + what); }
 
-/// An open object of the library.
-class Handle {
- public:
-  Handle(hid_t id, herr_t (*close)(hid_t), const std::string& what) : id_(id), close_(close) { check(id >= 0, what); }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  ~Handle() { close_(id_); }
-  operator hid_t() const { return id_; }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
-
-/// The library prints nothing while this lives.
-class Quiet {
- public:
-  Quiet() {
-    H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  }
-  Quiet(const Quiet&) = delete;
-  Quiet& operator=(const Quiet&) = delete;
-  ~Quiet() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
-
- private:
-  H5E_auto2_t print_ = nullptr;
-  void* data_ = nullptr;
-};
+Handle handle(hid_t id, herr_t (*close)(hid_t), const std::string& what) { return {id, close, "HDF5: cannot " + what}; }
 
 Handle text_type() {
-  const hid_t type = H5Tcopy(H5T_C_S1);
+  Handle type = handle(H5Tcopy(H5T_C_S1), H5Tclose, "make a type of text");
   check(H5Tset_size(type, H5T_VARIABLE) >= 0 && H5Tset_cset(type, H5T_CSET_UTF8) >= 0, "make a type of text");
-  return {type, H5Tclose, "make a type of text"};
+  return type;
 }
 
 Handle property_list(hid_t kind) {
-  const hid_t list = H5Pcreate(kind);
+  Handle list = handle(H5Pcreate(kind), H5Pclose, "make a property list");
   check(H5Pset_obj_track_times(list, false) >= 0, "leave out times");  // equal content, equal bytes
-  return {list, H5Pclose, "make a property list"};
+  return list;
 }
 
 void write_datatype(hid_t object, const char* python_type) {
   const Handle type = text_type();
-  const Handle space(H5Screate(H5S_SCALAR), H5Sclose, "make a scalar");
-  const Handle attribute(H5Acreate2(object, "datatype", type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
-                         "make an attribute");
+  const Handle space = handle(H5Screate(H5S_SCALAR), H5Sclose, "make a scalar");
+  const Handle attribute =
+      handle(H5Acreate2(object, "datatype", type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, "make an attribute");
   check(H5Awrite(attribute, type, &python_type) >= 0, "write an attribute");
 }
 
 void write_dataset(hid_t parent, const std::string& name, const char* python_type, hid_t file_type, hid_t memory_type,
                    std::span<const hsize_t> shape, const void* data) {
-  const Handle space(
+  const Handle space = handle(
       shape.empty() ? H5Screate(H5S_SCALAR) : H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
       H5Sclose, "make a shape");
   const Handle properties = property_list(H5P_DATASET_CREATE);
-  const Handle dataset(H5Dcreate2(parent, name.c_str(), file_type, space, H5P_DEFAULT, properties, H5P_DEFAULT),
-                       H5Dclose, "make " + name);
+  const Handle dataset =
+      handle(H5Dcreate2(parent, name.c_str(), file_type, space, H5P_DEFAULT, properties, H5P_DEFAULT), H5Dclose,
+             "make " + name);
   check(H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0, "write " + name);
   write_datatype(dataset, python_type);
 }
@@ -127,19 +100,19 @@ struct Writer {
 
   Handle group(const char* python_type) const {
     const Handle properties = property_list(H5P_GROUP_CREATE);
-    const hid_t id = H5Gcreate2(parent, name.c_str(), H5P_DEFAULT, properties, H5P_DEFAULT);
-    check(id >= 0, "make " + name);
-    write_datatype(id, python_type);
-    return {id, H5Gclose, "make " + name};
+    Handle made =
+        handle(H5Gcreate2(parent, name.c_str(), H5P_DEFAULT, properties, H5P_DEFAULT), H5Gclose, "make " + name);
+    write_datatype(made, python_type);
+    return made;
   }
 };
 
 /// The bytes of a file that the library builds in memory.
 std::string file_image(const ExudynDictionary& dictionary) {
-  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "make a property list");
+  const Handle access = handle(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "make a property list");
   check(H5Pset_fapl_core(access, size_t{1} << 16, false) >= 0, "work in memory");
   const Handle creation = property_list(H5P_FILE_CREATE);
-  const Handle file(H5Fcreate("exudyn", H5F_ACC_TRUNC, creation, access), H5Fclose, "make a file");
+  const Handle file = handle(H5Fcreate("exudyn", H5F_ACC_TRUNC, creation, access), H5Fclose, "make a file");
   for (const auto& [name, value] : dictionary) std::visit(Writer{file, name}, value);
   check(H5Fflush(file, H5F_SCOPE_GLOBAL) >= 0, "finish the file");
   const ssize_t size = H5Fget_file_image(file, nullptr, 0);
@@ -153,7 +126,7 @@ std::string file_image(const ExudynDictionary& dictionary) {
 class Reader {
  public:
   explicit Reader(const std::filesystem::path& path)
-      : file_(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, "open it: it is no HDF5 file"),
+      : file_(handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, "open it: it is no HDF5 file")),
         bytes_(std::filesystem::file_size(path)) {}
 
   ExudynDictionary all() const {
@@ -162,7 +135,7 @@ class Reader {
     check(H5Gget_info(file_, &info) >= 0, "list the entries");
     for (hsize_t i = 0; i < info.nlinks; ++i) {
       const std::string name = link_name(i);
-      const Handle object(H5Oopen(file_, name.c_str(), H5P_DEFAULT), H5Oclose, "open " + name);
+      const Handle object = handle(H5Oopen(file_, name.c_str(), H5P_DEFAULT), H5Oclose, "open " + name);
       add(dictionary, name, object);
     }
     return dictionary;
@@ -186,7 +159,7 @@ class Reader {
       return;
     }
     if (H5Iget_type(object) != H5I_DATASET) return;
-    const Handle type(H5Dget_type(object), H5Tclose, "read the type of " + name);
+    const Handle type = handle(H5Dget_type(object), H5Tclose, "read the type of " + name);
     const std::vector<hsize_t> shape = shape_of(object, name);
     switch (H5Tget_class(type)) {
       case H5T_STRING:
@@ -204,7 +177,7 @@ class Reader {
   }
 
   std::vector<hsize_t> shape_of(hid_t dataset, const std::string& name) const {
-    const Handle space(H5Dget_space(dataset), H5Sclose, "read the shape of " + name);
+    const Handle space = handle(H5Dget_space(dataset), H5Sclose, "read the shape of " + name);
     const int axes = H5Sget_simple_extent_ndims(space);
     check(axes >= 0 && axes <= 2, "use " + name + ": it has " + std::to_string(axes) + " axes, at most 2 are known");
     std::vector<hsize_t> shape(static_cast<size_t>(axes));
@@ -229,7 +202,7 @@ class Reader {
   }
 
   static std::string text(hid_t dataset, const std::string& name) {
-    const Handle stored(H5Dget_type(dataset), H5Tclose, "read the type of " + name);
+    const Handle stored = handle(H5Dget_type(dataset), H5Tclose, "read the type of " + name);
     check(H5Tis_variable_str(stored) > 0, "read " + name + ": a text of variable length is expected");
     const Handle type = text_type();
     char* value = nullptr;
@@ -244,7 +217,7 @@ class Reader {
     for (std::string item = "item_0"; H5Lexists(group, item.c_str(), H5P_DEFAULT) > 0;
          item = "item_" + std::to_string(items.size())) {
       const std::string full = name + "/" + item;
-      const Handle dataset(H5Dopen2(group, item.c_str(), H5P_DEFAULT), H5Dclose, "open " + full);
+      const Handle dataset = handle(H5Dopen2(group, item.c_str(), H5P_DEFAULT), H5Dclose, "open " + full);
       items.push_back(text(dataset, full));
     }
     return items;
@@ -257,12 +230,12 @@ class Reader {
 }  // namespace
 
 void write_exudyn_dictionary(const std::filesystem::path& path, const ExudynDictionary& dictionary) {
-  const Quiet quiet;
+  const SilentHdf5 silent;
   write_file(path, file_image(dictionary));
 }
 
 ExudynDictionary read_exudyn_dictionary(const std::filesystem::path& path) {
-  const Quiet quiet;
+  const SilentHdf5 silent;
   std::error_code error;
   require(std::filesystem::is_regular_file(path, error), "cannot read " + path.string() + ": there is no such file");
   try {

@@ -126,6 +126,28 @@ TEST(Exudyn, BodyWithoutTrianglesOrMarkersIsWritten) {
   EXPECT_EQ(run_python("export_exudyn.py", folder.path), 0);
 }
 
+TEST(Exudyn, FilesOfExudynItselfAreRead) {
+  const Folder folder;
+  const std::filesystem::path path = folder.path / "boom.hdf5";
+  const ReducedBody body = clamped_sample(2).body;
+  write_exudyn(body, {}, path);
+  ExudynDictionary file = read_exudyn_dictionary(path);
+  for (const char* ours : {"name", "units", "program", "dampingMatrixReduced", "markerNames", "markerNodes"}) {
+    file.erase(ours);
+  }
+  file["trigList"] = VectorXd(0);  // np.array([])
+  write_exudyn_dictionary(path, file);
+  const ReducedBody back = read_exudyn(path);
+  EXPECT_EQ(back.name, "exudyn");
+  EXPECT_EQ(back.Ke, body.Ke);
+  EXPECT_TRUE(back.De.isZero(0));
+  EXPECT_TRUE(back.markers.empty());
+  EXPECT_TRUE(back.display.triangles.empty());
+  file["trigList"] = VectorXd(VectorXd::Zero(3));
+  write_exudyn_dictionary(path, file);
+  EXPECT_NE(message([&] { read_exudyn(path); }).find("trigList\" is of another kind"), std::string::npos);
+}
+
 TEST(Exudyn, EqualBodiesMakeEqualFiles) {
   const Folder folder;
   const ReducedBody body = clamped_sample(2).body;
@@ -163,9 +185,12 @@ TEST(Exudyn, WhatIsLostIsSaid) {
   EXPECT_TRUE(says(exudyn_cannot_hold(body), "dampingMatrixReduced"));
   EXPECT_FALSE(says(exudyn_cannot_hold(body), "Geometric stiffness"));
   EXPECT_TRUE(says(exudyn_cannot_hold(body), "stop"));
+  EXPECT_TRUE(says(exudyn_cannot_hold(body), "Gravity"));
   body.De.setZero();
+  body.Ct *= 1e-15;  // mean axes
   body.Kg.spin.assign(6, MatrixXd::Identity(2, 2));
   EXPECT_FALSE(says(exudyn_cannot_hold(body), "Damping"));
+  EXPECT_FALSE(says(exudyn_cannot_hold(body), "Gravity"));
   EXPECT_TRUE(says(exudyn_cannot_hold(body), "Geometric stiffness"));
 }
 
