@@ -3,9 +3,12 @@
 #include "fem/check.hpp"
 #include "fem/files.hpp"
 #include "reduction/export_integrals.hpp"
+#include "reduction/mass_points.hpp"
+#include "reduction/tilde.hpp"
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iterator>
 #include <set>
 
@@ -16,8 +19,16 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 constexpr ExportSetting settings[] = {
-    {"invariants", "yes|no", "record groups 14 to 19; MBDyn up to 1.7.3 stops at them"},
+    {"invariants", "points|groups|no",
+     "as mass points (record group 11), which every MBDyn sums up; as record groups 14 to 18, at which 1.7.3 stops"},
+    {"stiffening", "no|yes", "record group 19, for an MBDyn that reads it: the public sources up to 2022 stop at it"},
 };
+
+/// That label, with underscores behind it while it is taken.
+std::string unused_label(std::string label, std::set<std::string>& used) {
+  while (!used.insert(label).second) label += '_';
+  return label;
+}
 
 void set_invariants_3_to_9(MbdynFile& file, const ReducedBody& body) {
   const Index n = body.n();
@@ -31,6 +42,24 @@ void set_invariants_3_to_9(MbdynFile& file, const ReducedBody& body) {
     file.Inv8.middleCols<3>(3 * j) = -raw.tilde_u0_tilde_S(j);
     file.Inv5.middleCols(n * j, n) = body.Cr1[static_cast<size_t>(j)];
     for (Index k = 0; k < n; ++k) file.Inv9.middleCols<3>(3 * (n * j + k)) = raw.tilde_S_tilde_S(j, k);
+  }
+}
+
+/// Nodes behind the markers, no points of the body, whose masses have its integrals.
+void add_mass_points(MbdynFile& file, const ReducedBody& body, std::set<std::string>& used) {
+  const RawIntegrals must_exist(body, "mbdyn");
+  const MassPoints points = mass_points(body.gram);
+  const Index first = file.positions.cols();
+  const Index count = points.z.cols();
+  file.masses.assign(static_cast<size_t>(first), 0);
+  file.positions.conservativeResize(3, first + count);
+  file.positions.rightCols(count) = points.z.middleRows<3>(1);
+  for (Index i = 0; i < count; ++i) {
+    file.labels.push_back(unused_label(fmt::format("mass_{}", i + 1), used));
+    file.masses.push_back(points.m);
+    MatrixXd shape = MatrixXd::Zero(6, body.n());
+    shape.topRows<3>() = points.z.col(i).tail(3 * body.n()).reshaped(3, body.n());
+    file.shapes.push_back(shape);
   }
 }
 
@@ -97,6 +126,10 @@ std::string text_of(const MbdynFile& file, const ReducedBody& body) {
   }
   w.matrix(9, "MODAL MASS MATRIX. COLUMN-MAJOR FORM", file.mass);
   w.matrix(10, "MODAL STIFFNESS MATRIX. COLUMN-MAJOR FORM", file.stiffness);
+  if (!file.masses.empty()) {
+    w.group(11, "DIAGONAL OF LUMPED MASS MATRIX");
+    for (const double m : file.masses) w.rows((Eigen::RowVectorXd(6) << m, m, m, 0, 0, 0).finished());
+  }
   w.group(12, "GLOBAL INERTIA PROPERTIES");
   w.rows(MatrixXd::Constant(1, 1, file.m));
   w.rows(file.centre.transpose());
@@ -133,6 +166,9 @@ std::string identifier(std::string_view name) {
 /// Nodes and joint that use the file, to be completed.
 std::string template_of(const MbdynFile& file, const std::string& name, const std::string& fem_file) {
   const std::string body = identifier(name);
+  const size_t points =
+      file.masses.empty() ? 0 : file.masses.size() - static_cast<size_t>(std::ranges::count(file.masses, 0));
+  const size_t markers = file.labels.size() - points;
   std::string text = fmt::format(
       "# Template for MBDyn: nodes and joint of the flexible body \"{0}\". The frame of its modal node is the body's.\n"
       "# To be completed: integers JOINT_{0}, MODAL_{0} and one NODE_... per interface node; these are static\n"
@@ -146,12 +182,13 @@ std::string template_of(const MbdynFile& file, const std::string& name, const st
       "  damping from file,\n"
       "  \"{2}\",\n"
       "  {3}",
-      body, file.mass.rows(), fem_file, file.labels.size());
-  for (size_t i = 0; i < file.labels.size(); ++i) {
+      body, file.mass.rows(), fem_file, markers);
+  for (size_t i = 0; i < markers; ++i) {
     const Eigen::Vector3d r = file.positions.col(static_cast<Index>(i));
     fmt::format_to(std::back_inserter(text), ",\n  # at {2:.17g}, {3:.17g}, {4:.17g} m\n  \"{0}\", NODE_{1}, null",
                    file.labels[i], identifier(name + "_" + file.labels[i]), r.x(), r.y(), r.z());
   }
+  if (!file.masses.empty()) text += ",\n  use invariant 9";  // the second order of the inertia in the coordinates
   return text + ";\n";
 }
 
@@ -163,15 +200,14 @@ MbdynFile mbdyn_file(const ReducedBody& body, const ExportOptions& options) {
   require(!body.markers.empty(), fmt::format("body \"{}\" has no markers: an MBDyn file needs one node or more, to "
                                              "which other bodies are joined",
                                              body.name));
-  const bool invariants = setting(settings, options, "invariants") == "yes";
+  const std::string invariants = setting(settings, options, "invariants");
+  const bool stiffening = setting(settings, options, "stiffening") == "yes";
   MbdynFile file;
   file.positions.resize(3, static_cast<Index>(body.markers.size()));
   std::set<std::string> used;
   for (size_t i = 0; i < body.markers.size(); ++i) {
     const Marker& m = body.markers[i];
-    std::string label = plain_name(m.name);
-    while (!used.insert(label).second) label += '_';
-    file.labels.push_back(label);
+    file.labels.push_back(unused_label(plain_name(m.name), used));
     file.positions.col(static_cast<Index>(i)) = m.position;
     MatrixXd shape(6, body.n());
     shape << m.S, m.S_theta;
@@ -183,10 +219,10 @@ MbdynFile mbdyn_file(const ReducedBody& body, const ExportOptions& options) {
   file.m = body.m;
   file.centre = body.mc0 / body.m;
   file.inertia = body.J0 - centre_inertia(body.m, body.mc0);
-  if (invariants && body.n() > 0) {
-    set_invariants_3_to_9(file, body);
-    set_stiffening(file, body);
-  }
+  if (body.n() == 0) return file;
+  if (invariants == "points") add_mass_points(file, body, used);
+  if (invariants == "groups") set_invariants_3_to_9(file, body);
+  if (stiffening) set_stiffening(file, body);
   return file;
 }
 
@@ -201,9 +237,10 @@ std::vector<std::string> mbdyn_cannot_hold(const ReducedBody& body) {
   std::vector<std::string> sentences;
   if (body.n() > 0) {
     sentences.emplace_back(
-        "MBDyn up to 1.7.3 stops at record groups 14 to 19; without them (invariants = no) it has no coupling of modes "
-        "and rigid motion, since lumped masses of the interface nodes (group 11) would give wrong invariants and are "
-        "not written.");
+        "Geometric stiffness is in record group 19 (stiffening = yes), at which MBDyn 1.7.3 and its development "
+        "version "
+        "of 2022 stop; without it the body softens under spin. With invariants = no nothing couples modes and rigid "
+        "motion.");
   }
   if (body.frame == "free") {
     sentences.emplace_back("The coordinates hold rigid motions, which the modal node has as well: clamp the body.");
@@ -213,8 +250,30 @@ std::vector<std::string> mbdyn_cannot_hold(const ReducedBody& body) {
   return sentences;
 }
 
+void sum_nodal_masses(MbdynFile& file) {
+  const Index n = file.mass.rows();
+  file.Inv3 = file.Inv4 = MatrixXd::Zero(3, n);
+  file.Inv8 = MatrixXd::Zero(3, 3 * n);
+  file.Inv5 = MatrixXd::Zero(3, n * n);
+  file.Inv9 = MatrixXd::Zero(3, 3 * n * n);
+  for (size_t i = 0; i < file.masses.size(); ++i) {
+    const double m = file.masses[i];
+    const Eigen::Matrix3d u0 = tilde(file.positions.col(static_cast<Index>(i)));
+    const Eigen::Matrix3Xd S = file.shapes[i].topRows<3>();
+    file.Inv3 += m * S;
+    file.Inv4 += m * u0 * S;
+    for (Index j = 0; j < n; ++j) {
+      const Eigen::Matrix3d S_j = tilde(S.col(j));
+      file.Inv8.middleCols<3>(3 * j) -= m * u0 * S_j;
+      file.Inv5.middleCols(n * j, n) += m * S_j * S;
+      for (Index k = 0; k < n; ++k) file.Inv9.middleCols<3>(3 * (n * j + k)) += m * S_j * tilde(S.col(k));
+    }
+  }
+}
+
 ReadBack mbdyn_read_back(const ExportOptions&, const std::filesystem::path& path) {
-  const MbdynFile file = read_mbdyn(path);
+  MbdynFile file = read_mbdyn(path);
+  if (!file.masses.empty()) sum_nodal_masses(file);
   ReadBack back;
   back.m = file.m;
   back.mc0 = file.m * file.centre;
@@ -226,6 +285,7 @@ ReadBack mbdyn_read_back(const ExportOptions&, const std::filesystem::path& path
   back.Me = file.mass;
   back.Ke = file.stiffness;
   for (size_t i = 0; i < file.labels.size(); ++i) {
+    if (!file.masses.empty() && file.masses[i] > 0) continue;
     back.markers.push_back({file.labels[i], file.positions.col(static_cast<Index>(i)), file.shapes[i].topRows<3>(),
                             file.shapes[i].bottomRows<3>()});
   }

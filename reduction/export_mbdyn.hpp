@@ -8,14 +8,15 @@ namespace flexboom {
 
 /// Data of an MBDyn modal element file, in the axes of the modal node, which is the BRF: record groups 1 to 19.
 struct MbdynFile {
-  std::vector<std::string> labels;  // of the nodes
+  std::vector<std::string> labels;  // of the nodes: markers, then the mass points of group 11
   Eigen::Matrix3Xd positions;
   std::vector<Eigen::MatrixXd> shapes;  // one per node: 6 x n, displacements and rotations
   Eigen::MatrixXd mass, stiffness, damping;
   double m = 0;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // about the centre
-  // Groups 14 to 18, empty without them. Modal.cc builds the same from nodal masses m_i at u_i; here the integrals.
+  std::vector<double> masses;                         // group 11, one per node; empty without it
+  // Groups 14 to 18, empty without them. Modal.cc builds the same from the nodal masses of group 11.
   Eigen::MatrixXd Inv3;  // 3 x n: int S_j
   Eigen::MatrixXd Inv4;  // 3 x n: int u0 x S_j
   Eigen::MatrixXd Inv8;  // 3 x 3n: -int tilde(u0) tilde(S_j)
@@ -29,9 +30,11 @@ struct MbdynFile {
 
 std::span<const ExportSetting> mbdyn_settings();
 
-/// What the file of that body holds. @throws InputError without markers, or without gram where groups 14 to 18 are
-/// wanted.
+/// What the file of that body holds. @throws InputError without markers, or without gram where invariants are wanted.
 MbdynFile mbdyn_file(const ReducedBody&, const ExportOptions&);
+
+/// Invariants 3, 4, 5, 8 and 9 as modal.cc sums them over the nodal masses, in place of what groups 14 to 18 hold.
+void sum_nodal_masses(MbdynFile&);
 
 /// Reads a file of modal element data: any order of groups, any comments. @throws InputError with file:line:column.
 MbdynFile read_mbdyn(const std::filesystem::path&);

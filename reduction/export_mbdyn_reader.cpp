@@ -138,6 +138,10 @@ MbdynFile read_mbdyn(const std::filesystem::path& path) {
   file.m = inertia(0);
   file.centre = inertia.middleRows<3>(1);
   file.inertia = inertia.bottomRows<9>().reshaped<Eigen::RowMajor>(3, 3);
+  if (groups.has(11)) {
+    const MatrixXd masses = groups.matrix(11, nodes, 6);
+    file.masses.assign(masses.col(0).begin(), masses.col(0).end());
+  }
   if (groups.has(14)) {
     file.Inv3 = groups.matrix(14, 3, n);
     file.Inv4 = groups.matrix(15, 3, n);

@@ -80,9 +80,9 @@ void expect_near(const VectorXd& A, const VectorXd& B, double tolerance = 1e-12)
   EXPECT_LE((A - B).norm(), tolerance * B.norm()) << A.transpose() << "\n" << B.transpose();
 }
 
-MbdynFile written_mbdyn(const ReducedBody& body) {
+MbdynFile written_mbdyn(const ReducedBody& body, const ExportOptions& options) {
   const auto path = test::test_folder() / "bent.fem";
-  write_mbdyn(body, {}, path);
+  write_mbdyn(body, options, path);
   return read_mbdyn(path);
 }
 
@@ -120,8 +120,7 @@ Loads by_mbdyn(const MbdynFile& f, const Motion& x) {
   return loads;
 }
 
-TEST(ExportMotion, MbdynComputesTheInertiaForcesOfTheBody) {
-  const MbdynFile file = written_mbdyn(bent().body);
+void expect_inertia_forces_of_the_body(const MbdynFile& file) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     const Motion x = random_motion(seed);
     const Loads exact = by_points(x);
@@ -132,10 +131,21 @@ TEST(ExportMotion, MbdynComputesTheInertiaForcesOfTheBody) {
   }
 }
 
+TEST(ExportMotion, MbdynComputesTheInertiaForcesOfTheBody) {
+  expect_inertia_forces_of_the_body(written_mbdyn(bent().body, {{{"invariants", "groups"}}}));
+}
+
+TEST(ExportMotion, MbdynComputesThemFromMassPoints) {
+  MbdynFile file = written_mbdyn(bent().body, {});
+  EXPECT_EQ(file.Inv3.size(), 0);
+  sum_nodal_masses(file);
+  expect_inertia_forces_of_the_body(file);
+}
+
 TEST(ExportMotion, MbdynStiffensByLoadsInItsOrder) {
   ReducedBody body = bent().body;
   test::add_random_stiffening(body, 5);
-  const MbdynFile f = written_mbdyn(body);
+  const MbdynFile f = written_mbdyn(body, {{{"invariants", "groups"}, {"stiffening", "yes"}}});
   const auto& Kg = body.Kg;
   ASSERT_EQ(f.stiffening.size(), 12U + 3 * 6U);
   // omega products as mboct-fem takes them: squares, then xy, yz, zx; angular acceleration; acceleration; node loads.

@@ -95,8 +95,8 @@ TEST(ExportText, UnknownFormatsAndSettingsAreRefused) {
   };
   EXPECT_NE(exported("sidd", {}).find("there are \"coupling\""), std::string::npos);
   EXPECT_NE(exported("mbdyn", {{{"invariant", "yes"}}}).find("there are \"invariants\""), std::string::npos);
-  EXPECT_NE(exported("mbdyn", {{{"invariants", "maybe"}}}).find("one of yes|no"), std::string::npos);
-  EXPECT_NE(exported("mbdyn", {{{"invariants", "yes|no"}}}).find("one of yes|no"), std::string::npos);
+  EXPECT_NE(exported("mbdyn", {{{"invariants", "maybe"}}}).find("one of points|groups|no"), std::string::npos);
+  EXPECT_NE(exported("mbdyn", {{{"invariants", "points|groups"}}}).find("one of points|groups|no"), std::string::npos);
   EXPECT_NE(exported("coupling", {{{"a", "b"}}}).find("none for this format"), std::string::npos);
   EXPECT_NE(exported("42", {{{"spring", "hard"}}}).find("must be a number"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(path));
@@ -150,8 +150,9 @@ TEST(ExportText, OtherCoordinatesAreTheSameBody) {
 
 TEST(ExportMbdyn, FileHoldsWhatItSays) {
   const auto path = test::test_folder() / "bent.fem";
-  write_mbdyn(bent(), {}, path);
-  const MbdynFile data = mbdyn_file(bent(), {});
+  const ExportOptions groups{{{"invariants", "groups"}}};
+  write_mbdyn(bent(), groups, path);
+  const MbdynFile data = mbdyn_file(bent(), groups);
   const MbdynFile file = read_mbdyn(path);
   EXPECT_EQ(file.labels, (std::vector<std::string>{"middle", "root", "tip"}));
   EXPECT_EQ(file.damping, data.damping);
@@ -169,9 +170,28 @@ TEST(ExportMbdyn, FileHoldsWhatItSays) {
   EXPECT_NE(joint.find("  \"tip\", NODE_bent_body_tip, null;\n"), std::string::npos);
 }
 
+TEST(ExportMbdyn, MassPointsAreNodesBehindTheMarkers) {
+  const auto path = test::test_folder() / "bent.fem";
+  const ExportReport report = export_body(bent(), "mbdyn", {}, path);
+  for (const BodyCheck& c : report.checks) EXPECT_TRUE(c.passed) << c.name;
+  const MbdynFile file = read_mbdyn(path);
+  ASSERT_EQ(file.masses.size(), file.labels.size());
+  EXPECT_EQ(file.labels[2], "tip");
+  EXPECT_EQ(file.labels[3], "mass_1");
+  EXPECT_EQ(file.masses[2], 0);
+  const std::string text = file_bytes(path);
+  EXPECT_EQ(text.find("GROUP 14"), std::string::npos);  // MBDyn 1.7.3 knows groups 1 to 13
+  EXPECT_EQ(text.find("GROUP 19"), std::string::npos);
+  std::filesystem::path modal = path;
+  const std::string joint = file_bytes(modal.replace_extension(".modal"));
+  EXPECT_NE(joint.find("  \"bent.fem\",\n  3,\n"), std::string::npos);
+  EXPECT_NE(joint.find("  \"tip\", NODE_bent_body_tip, null,\n  use invariant 9;\n"), std::string::npos);
+  EXPECT_EQ(joint.find("mass_1"), std::string::npos);
+}
+
 TEST(ExportMbdyn, FaultsNameTheirLine) {
   const auto path = test::test_folder() / "bent.fem";
-  write_mbdyn(bent(), {}, path);
+  write_mbdyn(bent(), {{{"invariants", "groups"}}}, path);
   const std::string good = file_bytes(path);
   const auto message_of = [&](const std::string& from, const std::string& to) {
     std::string bad = good;
