@@ -12,6 +12,7 @@
 #include "reduction/inertia_invariants.hpp"
 #include "reduction/mean_axis.hpp"
 #include "reduction/mode_selection.hpp"
+#include "reduction/root_loads.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -73,6 +74,7 @@ EigenOptions eigen_options(const Model& model, const ReduceArguments& a) {
   EigenOptions options;
   options.num_modes = a.count.value_or(model.modes.value_or(10));
   options.backend = a.backend.value_or(model.backend.value_or("auto"));
+  options.keep_factor = a.basis == "clamped";  // for the stiffening and the certificate
   return options;
 }
 
@@ -97,6 +99,11 @@ Assembled assembled(Model& model, const ReduceArguments& a, int threads) {
   if (a.basis == "mean-axis") result.clamp = Clamp({}, false);
   if (a.basis == "craig-bampton" && !a.options.clamp) result.clamp.nodes.clear();
   return result;
+}
+
+/// Static solutions over all unknowns, by the factor of the modes where they were solved with the same K.
+StaticSolver static_solver(SparseMatrix K, const ModalBasis& basis) {
+  return basis.factor ? StaticSolver(basis.factor, std::move(K)) : StaticSolver(K, {});
 }
 
 ModalBasis basis_of(const Model& model, const Assembled& m, const ReduceArguments& a, int threads) {
@@ -203,8 +210,9 @@ ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int thread
   if (!loads.empty()) basis = with_attachment_modes(std::move(basis), model.mesh, m.assembly, m.clamp, loads, threads);
   ReducedBody body = reduce(model.mesh, m.assembly, basis, model.name, threads);
   if (a.select) {
-    basis = selected(basis, selection(body, *a.select));
-    body = reduce(model.mesh, m.assembly, basis, model.name, threads);
+    const std::vector<int> list = selection(body, *a.select);
+    basis = selected(basis, list);
+    body = selected(body, list);
   }
   if (!basis.summary.note.empty()) model.notes.push_back(basis.summary.note);
   if (!basis.summary.proof.empty()) model.notes.push_back(basis.summary.proof);
@@ -217,7 +225,7 @@ ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int thread
   const bool flies = body.frame == "clamped" || body.frame == "mean-axis";
   std::optional<StaticSolver> statics;  // one factorisation for the stiffening and the certificate
   if (body.frame == "clamped" && body.n() > 0)
-    statics.emplace(unknowns(model.mesh, m.assembly.dofs, held).reduced(m.assembly.K), std::vector<int>{});
+    statics = static_solver(unknowns(model.mesh, m.assembly.dofs, held).reduced(m.assembly.K), basis);
   const StaticSolver* held_statics = statics ? &*statics : nullptr;
   if (a.stiffening && flies && body.n() > 0) {
     body.Kg =
@@ -231,6 +239,25 @@ ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int thread
   body.validate();
   return body;
 }
+
+namespace {
+
+/// omega_k^2 (Ct_k; Cr0_k): what each coordinate brings to the root when it vibrates. Empty without frequencies.
+std::string root_load_table(const ReducedBody& body) {
+  const Eigen::MatrixXd L = root_load_participation(body);
+  if (L.size() == 0 || L.isZero(0)) return "";
+  std::string text = fmt::format("root loads per unit of a coordinate that vibrates, omega^2 (Ct; Cr0)\n{:>4}", "q");
+  for (const char* name : {"Fx N", "Fy N", "Fz N", "Mx N m", "My N m", "Mz N m"}) text += fmt::format(" {:>12}", name);
+  text += "\n";
+  for (int k = 0; k < body.n(); ++k) {
+    text += fmt::format("{:4}", k + 1);
+    for (int i = 0; i < 6; ++i) text += fmt::format(" {:12.4e}", L(i, k));
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace
 
 std::string description(const ReducedBody& body, const std::vector<BodyCheck>& checks) {
   const Eigen::Vector3d centre = body.mc0 / body.m;
@@ -252,6 +279,7 @@ std::string description(const ReducedBody& body, const std::vector<BodyCheck>& c
     text += fmt::format("{:4} {:<12} {:16.8f} {:<12} {:<4} {:12.4e} {:12.4e} {:12.4e}\n", k + 1, c.kind, c.frequency_hz,
                         c.interface, c.direction, body.Ct(0, k), body.Ct(1, k), body.Ct(2, k));
   }
+  text += root_load_table(body);
   text += fmt::format("{:<58} {:>22} {:>22} {:>10}\n", "check", "value", "reference", "error");
   for (const BodyCheck& c : checks)
     text += fmt::format("{:<58} {:22.14g} {:22.14g} {:10.1e}{}\n", c.name, c.value, c.reference, c.relative_error,
@@ -272,11 +300,15 @@ nlohmann::ordered_json checks_json(const std::vector<BodyCheck>& checks) {
 
 nlohmann::ordered_json body_json(const ReducedBody& body, const std::vector<BodyCheck>& checks,
                                  const std::vector<std::string>& notes) {
+  const Eigen::MatrixXd L = root_load_participation(body);  // 6 x n
   auto coordinates = nlohmann::ordered_json::array();
   for (int k = 0; k < body.n(); ++k) {
     const Coordinate& c = body.coordinates[static_cast<size_t>(k)];
-    coordinates.push_back(
-        {{"kind", c.kind}, {"frequency_hz", c.frequency_hz}, {"interface", c.interface}, {"direction", c.direction}});
+    coordinates.push_back({{"kind", c.kind},
+                           {"frequency_hz", c.frequency_hz},
+                           {"interface", c.interface},
+                           {"direction", c.direction},
+                           {"root_loads", std::vector<double>(L.col(k).begin(), L.col(k).end())}});
   }
   auto markers = nlohmann::ordered_json::array();
   for (const Marker& m : body.markers)

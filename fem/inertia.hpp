@@ -13,7 +13,6 @@ namespace flexboom {
 /// Signs of the eigenvalues of a symmetric matrix (Sylvester's law: those of its pivots).
 struct Inertia {
   int negative = 0;
-  int zero = 0;  // pivots that are zero to round-off
   std::string method;
   double seconds = 0;
 };

@@ -71,7 +71,6 @@ class Mumps {
   }
 
   int negative_pivots() const { return id_.infog[11]; }
-  int zero_pivots() const { return id_.infog[27]; }
 
  private:
   int& control(int number) { return id_.icntl[number - 1]; }
@@ -100,7 +99,7 @@ Inertia mumps_inertia(const SparseMatrix& A) {
   Mumps mumps;
   mumps.give(A);
   mumps.factorise();
-  return {.negative = mumps.negative_pivots(), .zero = mumps.zero_pivots(), .method = "MUMPS"};
+  return {.negative = mumps.negative_pivots(), .method = "MUMPS"};
 }
 
 }  // namespace flexboom

@@ -5,6 +5,7 @@
 #include "reduction/mode_selection.hpp"
 #include "reduction/reduced_matrices.hpp"
 #include "reduction/static_shapes.hpp"
+#include "reduction/uniform_beam.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
@@ -154,8 +155,9 @@ std::vector<BodyCheck> certificate(const ReducedBody& body, const Mesh& mesh, co
     if (statics == nullptr) statics = &own.emplace(left.reduced(assembly.K), std::vector<int>{});
     add_static_response(checks, body, mesh, assembly.dofs, left, *statics, exact_at, threads);
   }
-  const std::vector<BodyCheck> own = body_checks(body);
-  checks.insert(checks.end(), own.begin(), own.end());
+  for (const std::vector<BodyCheck>& more :
+       {check_uniform_beam(body, mesh, assembly.dofs, clamp, basis), body_checks(body)})
+    checks.insert(checks.end(), more.begin(), more.end());
   return checks;
 }
 

@@ -63,6 +63,12 @@ void ShiftedFactor::move_to(double sigma) {
   sigma_ = sigma;
 }
 
+std::shared_ptr<const SparseFactor> ShiftedFactor::take_factor_of_K() {
+  if (sigma_ != 0) return nullptr;
+  sigma_.reset();
+  return std::move(factor_);
+}
+
 void ShiftedFactor::release() {
   factor_.reset();
   sigma_.reset();

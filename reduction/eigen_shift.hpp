@@ -22,6 +22,9 @@ class ShiftedFactor {
   /// Frees the factor: a second factorisation may need the memory.
   void release();
 
+  /// Gives the factor away where it is that of K, else nothing.
+  std::shared_ptr<const SparseFactor> take_factor_of_K();
+
   /// Ordering, entries, bytes and the seconds of all factorisations so far.
   void report(EigenSummary&) const;
 

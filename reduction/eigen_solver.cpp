@@ -146,6 +146,7 @@ EigenPairs solve_modes_with(const EigenBackend& backend, const EigenProblem& p, 
       pairs.summary.rigid_modes = zero_modes(p, pairs);
       if (sigma != 0 || pairs.summary.rigid_modes == 0) {
         pairs.summary.note = note;
+        if (options.keep_factor) pairs.factor = shifted.take_factor_of_K();
         return pairs;
       }
       reason = fmt::format("K is singular to round-off, the body can move in {} ways", pairs.summary.rigid_modes);

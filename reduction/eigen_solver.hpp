@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -29,6 +30,7 @@ struct EigenOptions {
   std::string backend = "arpack";  // a row of eigen_backends(), or "auto"
   SturmPolicy sturm = SturmPolicy::when_cheap;
   bool whole_groups = false;  // return more modes than asked where a group of equal frequencies would be cut
+  bool keep_factor = false;   // hand out the factor of K where the shift is 0
 };
 
 /// What a solve did and how far it can be trusted.
@@ -61,6 +63,7 @@ struct EigenPairs {
   Eigen::VectorXd lambda;  // omega^2, ascending [rad^2/s^2]
   Eigen::MatrixXd Phi;     // M-orthonormal, one column per mode
   EigenSummary summary;
+  std::shared_ptr<const SparseFactor> factor{};  // of K, with EigenOptions::keep_factor; null: K was not factorised
 };
 
 /// What is asked of a backend: the `count` eigenvalues nearest above sigma. The first `wanted` shall have the relative

@@ -178,7 +178,7 @@ bool verify(const EigenProblem& p, ShiftedFactor& shifted, const EigenOptions& o
   const bool has_next = expected < pairs.lambda.size();
   s.sturm_shift = has_next ? (last + pairs.lambda(expected)) / 2 : last + 0.1 * (last - s.sigma);
   if (counts(shifted, options.sturm)) {
-    if (p.K.rows() > indefinite_unknowns) shifted.release();
+    if (p.K.rows() > indefinite_unknowns && !options.keep_factor) shifted.release();
     sturm_check(p, shifted.flops(), s, expected);
   }
   trim(pairs, residual, options.whole_groups ? expected : wanted);

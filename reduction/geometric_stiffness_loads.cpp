@@ -1,6 +1,7 @@
 #include "reduction/geometric_stiffness_loads.hpp"
 
 #include "fem/check.hpp"
+#include "reduction/tilde.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Dense>
@@ -17,13 +18,6 @@ using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
-
-Matrix3d tilde(int axis) {
-  Matrix3d A = Matrix3d::Zero();
-  A((axis + 2) % 3, (axis + 1) % 3) = 1;
-  A((axis + 1) % 3, (axis + 2) % 3) = -1;
-  return A;
-}
 
 /// The fields b at the nodes, freedoms x 12: rotations are half their curl, internal freedoms zero.
 MatrixXd nodal_fields(const Mesh& mesh, const DofMap& dofs, const LinearFields& fields) {
@@ -103,13 +97,13 @@ LinearFields inertial_fields() {
   LinearFields fields = LinearFields::Zero(12, inertial_loads);
   for (Index c = 0; c < 6; ++c) {  // -w x (w x u0)
     const auto [i, j] = spin_products[static_cast<size_t>(c)];
-    Matrix3d A = -tilde(i) * tilde(j);
+    Matrix3d A = -tilde(Vector3d::Unit(i)) * tilde(Vector3d::Unit(j));
     if (i != j) A += A.transpose().eval();
     fields.col(c).tail<9>() = A.reshaped();
   }
   for (int i = 0; i < 3; ++i) {
-    fields(i, 6 + i) = -1;                               // -a
-    fields.col(9 + i).tail<9>() = -tilde(i).reshaped();  // -alpha x u0
+    fields(i, 6 + i) = -1;                                               // -a
+    fields.col(9 + i).tail<9>() = -tilde(Vector3d::Unit(i)).reshaped();  // -alpha x u0
   }
   return fields;
 }

@@ -81,17 +81,6 @@ void set_clamped_interface(ModalBasis& basis, const Mesh& mesh, const Clamp& cla
   }
 }
 
-/// The coordinates of an interface after a choice of modes; -1 when not all of them are kept, in their order.
-void renumber(Interface& interface, const std::vector<int>& modes) {
-  if (interface.first_coordinate < 0) return;
-  const auto count = std::ranges::count(interface.components, true);
-  const auto place = std::ranges::find(modes, interface.first_coordinate);
-  interface.first_coordinate = modes.end() - place < count ? -1 : static_cast<int>(place - modes.begin());
-  for (int k = 1; k < count && interface.first_coordinate >= 0; ++k) {
-    if (place[k] != *place + k) interface.first_coordinate = -1;
-  }
-}
-
 /// The eigenproblem of a mesh whose constraints are eliminated.
 struct Reduced {
   explicit Reduced(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp)
@@ -117,6 +106,7 @@ ModalBasis modes_of(const ModalModel& model, const Clamp& clamp, const Reduced& 
   ModalBasis basis = finished(model, reduced.unknowns.expanded(pairs.Phi), masses_of, pairs.summary, options.num_modes,
                               rigid, threads);
   basis.unknowns = count;
+  basis.factor = pairs.factor;
   set_clamped_interface(basis, model.mesh, clamp);
   return basis;
 }
@@ -128,6 +118,16 @@ std::vector<Coordinate> mode_table(const ModalBasis& basis) {
   for (size_t i = 0; i < basis.kind.size(); ++i)
     table.push_back({std::string(name_of(basis.kind[i])), basis.omega(static_cast<Index>(i)) / (2 * std::numbers::pi)});
   return table;
+}
+
+void renumber(Interface& interface, const std::vector<int>& modes) {
+  if (interface.first_coordinate < 0) return;
+  const auto count = std::ranges::count(interface.components, true);
+  const auto place = std::ranges::find(modes, interface.first_coordinate);
+  interface.first_coordinate = modes.end() - place < count ? -1 : static_cast<int>(place - modes.begin());
+  for (int k = 1; k < count && interface.first_coordinate >= 0; ++k) {
+    if (place[k] != *place + k) interface.first_coordinate = -1;
+  }
 }
 
 ModalBasis selected(const ModalBasis& basis, const std::vector<int>& modes) {

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -24,11 +25,15 @@ struct ModalBasis {
   std::string frame = "clamped";        // as ReducedBody::frame
   std::vector<Coordinate> coordinates;  // one per shape
   std::vector<Interface> interfaces;
-  std::vector<int> interface_nodes;  // the node that carries each; -1: the mean of the node set of its name
+  std::shared_ptr<const SparseFactor> factor{};  // of K over the unknowns, with EigenOptions::keep_factor; may be null
+  std::vector<int> interface_nodes;              // the node that carries each; -1: the mean of the node set of its name
 };
 
 /// Coordinate table of a basis of modes, from `kind` and `omega`.
 std::vector<Coordinate> mode_table(const ModalBasis&);
+
+/// Takes an interface to a choice of coordinates: -1 when not all of its own are kept, one after the other.
+void renumber(Interface&, const std::vector<int>& list);
 
 /// The listed shapes of a basis, in that order. An interface that loses a coordinate has none any more.
 /// @throws InputError for an index that does not exist.

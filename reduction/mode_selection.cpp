@@ -73,6 +73,37 @@ std::vector<int> listed_modes(const ReducedBody& body, std::vector<int> list) {
   return list;
 }
 
+ReducedBody selected(const ReducedBody& body, const std::vector<int>& list) {
+  for (const int k : list)
+    require(k >= 0 && k < body.n(), fmt::format("modes: coordinate {} chosen of a body of {}", k, body.n()));
+  require(body.gram.size() > 0, "modes: body \"" + body.name + "\" has no gram to choose coordinates from");
+  ReducedBody result = body;
+  std::vector<int> z = {0, 1, 2, 3};
+  result.coordinates.clear();
+  for (const int k : list) {
+    for (int i = 0; i < 3; ++i) z.push_back(4 + 3 * k + i);
+    result.coordinates.push_back(body.coordinates[static_cast<size_t>(k)]);
+  }
+  const auto keep = [&list](std::vector<MatrixXd>& matrices) {
+    for (MatrixXd& A : matrices) A = A(list, list).eval();
+  };
+  const auto keep_columns = [&list](Eigen::Matrix3Xd& S) { S = S(Eigen::all, list).eval(); };
+  ReducedBody blank = blank_body(body.name, static_cast<int>(list.size()));
+  set_invariants(blank, body.gram(z, z));
+  result.Ct = blank.Ct, result.Cr0 = blank.Cr0, result.Me = blank.Me, result.gram = blank.gram;
+  result.Cr1 = std::move(blank.Cr1), result.J1 = std::move(blank.J1), result.J2 = std::move(blank.J2);
+  result.Ke = body.Ke(list, list);
+  result.De = body.De(list, list);
+  for (auto* loads : {&result.Kg.spin, &result.Kg.acceleration, &result.Kg.angular_acceleration}) keep(*loads);
+  for (MarkerStiffness& at : result.Kg.markers) keep(at.force), keep(at.torque);
+  for (Marker& at : result.markers) keep_columns(at.S), keep_columns(at.S_theta);
+  std::ranges::for_each(result.display.S, keep_columns);
+  std::ranges::for_each(result.display.S_theta, keep_columns);
+  for (Interface& at : result.interfaces) renumber(at, list);
+  result.certificate.clear();
+  return result;
+}
+
 MatrixXd effective_masses(const ReducedBody& body) {
   return rigid_coupling(body).cwiseAbs2() * body.Me.diagonal().cwiseInverse().asDiagonal();
 }

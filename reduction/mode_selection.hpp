@@ -18,6 +18,11 @@ std::vector<int> modes_in_band(const ReducedBody&, double low_hz, double high_hz
 /// The list, sorted. @throws InputError for an index that does not exist or is given twice.
 std::vector<int> listed_modes(const ReducedBody&, std::vector<int>);
 
+/// The body with the listed coordinates alone, in that order; all its integrals, markers and stiffnesses come with
+/// them. An interface that loses a coordinate has none any more. The certificate is dropped.
+/// @throws InputError for an index that does not exist, and when the body has no `gram`.
+ReducedBody selected(const ReducedBody&, const std::vector<int>& list);
+
 /// Mass matrix of the rigid motions about the BRF origin, and L = [Ct; Cr0] (6 x n) that couples the coordinates with
 /// them.
 Eigen::Matrix<double, 6, 6> rigid_mass(const ReducedBody&);

@@ -5,7 +5,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 namespace flexboom {
@@ -90,7 +92,15 @@ void validate_flexible_part(const ReducedBody& body, const Checker& c) {
   c.check(n == 0 || Eigen::LLT<Eigen::MatrixXd>(body.Me).info() == Eigen::Success, "Me", "must be positive definite");
 }
 
+/// Names of markers or interfaces, none of them twice.
+template <class Named>
+void validate_names(const std::vector<Named>& things, const std::string& field, const Checker& c) {
+  std::set<std::string> names;
+  for (const Named& thing : things) c.check(names.insert(thing.name).second, field, "has \"" + thing.name + "\" twice");
+}
+
 void validate_points(const ReducedBody& body, const Checker& c) {
+  validate_names(body.markers, "markers", c);
   for (const Marker& marker : body.markers) {
     c.shape(marker.position, 3, 1, "marker \"" + marker.name + "\" position");
     c.shape(marker.S, 3, body.n(), "marker \"" + marker.name + "\" S");
@@ -99,6 +109,35 @@ void validate_points(const ReducedBody& body, const Checker& c) {
   c.check(body.display.S.size() == static_cast<size_t>(body.display.points.cols()), "display.S",
           "must have one entry per point");
   for (const Eigen::Matrix3Xd& S : body.display.S) c.shape(S, 3, body.n(), "display.S");
+}
+
+void validate_interfaces(const ReducedBody& body, const Checker& c) {
+  validate_names(body.interfaces, "interfaces", c);
+  for (const Interface& i : body.interfaces) {
+    const auto count = static_cast<int>(std::ranges::count(i.components, true));
+    const int first = i.first_coordinate;
+    c.check(first == -1 || (first >= 0 && first + count <= body.n()), "interface \"" + i.name + "\"",
+            "has " + std::to_string(count) + " coordinates from " + std::to_string(first) + ", the body has " +
+                std::to_string(body.n()));
+  }
+}
+
+void validate_stiffening(const ReducedBody& body, const Checker& c) {
+  const auto family = [&](const std::vector<Eigen::MatrixXd>& matrices, size_t count, const std::string& field) {
+    c.check(matrices.empty() || matrices.size() == count, field,
+            "has " + std::to_string(matrices.size()) + " matrices, must have " + std::to_string(count) + " or none");
+    for (const Eigen::MatrixXd& A : matrices) c.shape(A, body.n(), body.n(), field);
+  };
+  family(body.Kg.spin, 6, "Kg.spin");
+  family(body.Kg.acceleration, 3, "Kg.acceleration");
+  family(body.Kg.angular_acceleration, 3, "Kg.angular_acceleration");
+  for (const MarkerStiffness& at : body.Kg.markers) {
+    const std::string where = "Kg of marker \"" + at.marker + "\"";
+    c.check(std::ranges::find(body.markers, at.marker, &Marker::name) != body.markers.end(), where,
+            "is of a marker that the body does not have");
+    family(at.force, 3, where + " force");
+    family(at.torque, 3, where + " torque");
+  }
 }
 
 // For W = sum dm a b^T:  sum dm a x b  is its axial vector, and  -sum dm (tilde(a) tilde(b) + tilde(b) tilde(a)) / 2 =
@@ -115,6 +154,8 @@ void ReducedBody::validate() const {
   validate_rigid_part(*this, c);
   validate_flexible_part(*this, c);
   validate_points(*this, c);
+  validate_interfaces(*this, c);
+  validate_stiffening(*this, c);
 }
 
 ReducedBody blank_body(std::string name, int n) {

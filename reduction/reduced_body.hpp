@@ -110,7 +110,8 @@ struct ReducedBody {
 
   int n() const { return static_cast<int>(Me.rows()); }
 
-  /// Sizes agree, m > 0, J0 is an inertia, Me is positive definite.
+  /// Sizes agree, m > 0, J0 is an inertia, Me is positive definite, no marker or interface is there twice, interfaces
+  /// lie within the coordinates.
   /// @throws InputError naming the field.
   void validate() const;
 };

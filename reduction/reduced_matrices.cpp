@@ -1,5 +1,6 @@
 #include "reduction/reduced_matrices.hpp"
 
+#include "fem/dense.hpp"
 #include "fem/parallel.hpp"
 
 #include <algorithm>
@@ -114,13 +115,13 @@ MatrixXd gram_of_solids(const Mesh& mesh, const Assembly& assembly, const Matrix
     if (assembly.dofs.freedoms_of(a) < 3) continue;
     Z.row(a).tail(size - 4) = Phi.middleRows<3>(assembly.dofs.of_node(a, 0)).reshaped().transpose();
   }
-  // A few columns of M_s Z at a time; Eigen's product takes the threads.
+  // A few columns of M_s Z at a time.
   MatrixXd gram(size, size);
   constexpr Index chunk = 16;
   const int chunks = static_cast<int>((size + chunk - 1) / chunk);
   parallel_for(threads, chunks, 1, [&](int c) {
     const Index first = c * chunk, cols = std::min(chunk, size - first);
-    gram.middleCols(first, cols).noalias() = Z.transpose() * symmetric_product(M_s, Z.middleCols(first, cols));
+    gram.middleCols(first, cols) = transposed_product(Z, symmetric_product(M_s, Z.middleCols(first, cols)));
   });
   return (gram + gram.transpose()) / 2;
 }
@@ -145,12 +146,13 @@ class StiffnessSum {
   void flush(const MatrixXd& shapes) {
     if (filled_ == 0) return;
     const Index rows = D_.rows();
-    strain_.noalias() = B_.topRows(filled_) * shapes;
+    strain_.setZero(filled_, shapes.cols());
+    add_product(strain_, 1, Transposed::no, B_.topRows(filled_), shapes);
     stress_.resize(filled_, shapes.cols());
     for (Index first = 0; first < filled_; first += rows) {
       stress_.middleRows(first, rows).noalias() = D_.middleCols(first, rows) * strain_.middleRows(first, rows);
     }
-    sum_.noalias() += strain_.transpose() * stress_;
+    add_product(sum_, 1, Transposed::yes, strain_, stress_);
     filled_ = 0;
   }
 

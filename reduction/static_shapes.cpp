@@ -45,6 +45,12 @@ std::vector<int> others(Index count, const std::vector<int>& held) {
   return left;
 }
 
+std::shared_ptr<const SparseFactor> factorised(const SparseMatrix& K) {
+  auto factor = std::make_shared<SparseFactor>(K, FactorKind::definite);
+  factor->factorise(K);
+  return factor;
+}
+
 }  // namespace
 
 StaticSolver::StaticSolver(const SparseMatrix& K, const std::vector<int>& held)
@@ -52,17 +58,21 @@ StaticSolver::StaticSolver(const SparseMatrix& K, const std::vector<int>& held)
       held_(held),
       left_(others(K.cols(), held)),
       K_(parts(K, held_, left_)),
-      factor_(K_.first, FactorKind::definite) {
-  factor_.factorise(K_.first);
-}
+      factor_(factorised(K_.first)) {}
+
+StaticSolver::StaticSolver(std::shared_ptr<const SparseFactor> factor, SparseMatrix K)
+    : count_(K.cols()),
+      left_(others(K.cols(), {})),
+      K_(std::move(K), SparseMatrix(count_, 0)),
+      factor_(std::move(factor)) {}
 
 MatrixXd StaticSolver::solve(const MatrixXd& f) const {
   MatrixXd x(f.rows(), f.cols());
-  factor_.solve(f, x);
+  factor_->solve(f, x);
   // One correction by what is left of the load: the factor of a slender body loses digits that K still has.
   const MatrixXd left_over = f - symmetric_product(K_.first, x);
   MatrixXd correction(f.rows(), f.cols());
-  factor_.solve(left_over, correction);
+  factor_->solve(left_over, correction);
   return x + correction;
 }
 

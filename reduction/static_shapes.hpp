@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,9 @@ class StaticSolver {
  public:
   /// K: lower triangle. @throws NumericalError when the held unknowns leave a motion without stiffness.
   StaticSolver(const SparseMatrix& K, const std::vector<int>& held);
+
+  /// Nothing held, by the factor of K that the caller has (ModalBasis::factor).
+  StaticSolver(std::shared_ptr<const SparseFactor>, SparseMatrix K);
 
   /// x with the held unknowns at the given values and no load on the others: a column per column of `values`.
   Eigen::MatrixXd displaced(const Eigen::MatrixXd& values) const;
@@ -27,7 +31,7 @@ class StaticSolver {
   Eigen::Index count_ = 0;
   std::vector<int> held_, left_;
   std::pair<SparseMatrix, SparseMatrix> K_;  // K_ii (lower triangle) and K_ib; i: left, b: held
-  SparseFactor factor_;
+  std::shared_ptr<const SparseFactor> factor_;
 };
 
 }  // namespace flexboom

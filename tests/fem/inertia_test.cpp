@@ -46,7 +46,6 @@ TEST(Inertia, PivotsOfOrderTwoAreCounted) {
   const Inertia count = inertia(A, 1e3);
   EXPECT_EQ(count.method, "MUMPS");
   EXPECT_EQ(count.negative, 3);
-  EXPECT_EQ(count.zero, 0);
 }
 
 // In the first place MUMPS alone would count on.

@@ -346,15 +346,16 @@ TEST(BodyFile, BadBodiesAreNotWritten) {
   const std::vector<std::pair<std::string, std::function<void(ReducedBody&)>>> faults = {
       {"m must be positive", [](ReducedBody& b) { b.m = -1; }},
       {"Ct", [](ReducedBody& b) { b.Ct.conservativeResize(3, 1); }},
-      {"Kg/spin has 5 entries, must have 0 or 6", [](ReducedBody& b) { b.Kg.spin.pop_back(); }},
-      {"Kg/markers/1/force is 2 x 2, must be 4 x 4", [](ReducedBody& b) { b.Kg.markers[1].force[2].resize(2, 2); }},
-      {"Kg/acceleration has entries that are not finite",
+      {"Kg.spin has 5 matrices, must have 6 or none", [](ReducedBody& b) { b.Kg.spin.pop_back(); }},
+      {"Kg of marker \"root\" force is 2 x 2, must be 4 x 4",
+       [](ReducedBody& b) { b.Kg.markers[1].force[2].resize(2, 2); }},
+      {"Kg.acceleration has entries that are not finite",
        [](ReducedBody& b) { b.Kg.acceleration[2](1, 1) = std::nan(""); }},
       {"coordinates/frequency_hz", [](ReducedBody& b) { b.coordinates[0].frequency_hz = std::nan(""); }},
       {"display/S_theta", [](ReducedBody& b) { b.display.S_theta.pop_back(); }},
       {"display/lines has point 5 of 5", [](ReducedBody& b) { b.display.lines[0][0] = 5; }},
       {"display/triangles has point -1 of 5", [](ReducedBody& b) { b.display.triangles[0][0] = -1; }},
-      {"zero byte", [](ReducedBody& b) { b.markers[0].name = std::string("t\0p", 3); }},
+      {"zero byte", [](ReducedBody& b) { b.provenance.source = std::string("t\0p", 3); }},
       {"zero byte", [](ReducedBody& b) { b.frame = std::string("\0", 1); }},
   };
   for (const auto& [text, damage] : faults) {

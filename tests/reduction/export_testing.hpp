@@ -1,15 +1,14 @@
 #pragma once
 
 #include "fem/assembly.hpp"
-#include "fem/check.hpp"
 #include "fem/element.hpp"
 #include "reduction/inertia_invariants.hpp"
+#include "tests/reduction/messages.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <filesystem>
-#include <functional>
 #include <random>
 #include <string>
 
@@ -56,16 +55,6 @@ inline BentBody bent_body(int modes = 6) {
 inline const ReducedBody& bent() {
   static const ReducedBody body = bent_body().body;
   return body;
-}
-
-/// The message of the InputError that `f` throws, empty if it throws none.
-inline std::string message(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
 }
 
 /// Random numbers in [-1, 1], the same in every run.

@@ -2,6 +2,7 @@
 
 #include "fem/check.hpp"
 #include "reduction/eq14.hpp"
+#include "reduction/geometric_stiffness.hpp"
 #include "reduction/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 #include "tests/reduction/csv.hpp"
@@ -33,6 +34,33 @@ TEST(ModeSelection, EffectiveMassesAreThoseOfTheTable) {
     EXPECT_NEAR(effective(5, k) / body.J0(2, 2) / t.at("eff_inertia_about_root/(mL^2/3)")[row], 1, 1e-11) << k;
   }
   EXPECT_EQ(effective.row(0).norm() + effective.row(2).norm() + effective.row(4).norm(), 0);
+}
+
+TEST(ModeSelection, ABodyOfChosenCoordinatesIsThatOfTheChosenShapes) {
+  const test::Boom boom = test::make_boom(test::boom4(BeamTheory::timoshenko, true));
+  const Clamp clamp(node_set(boom.mesh, "root"));
+  const ModalBasis basis = clamped_modes(boom.mesh, boom.assembly, clamp, {.num_modes = 6, .sigma = {}});
+  ReducedBody all = reduce(boom.mesh, boom.assembly, basis, "boom");
+  all.Kg = geometric_stiffness(boom.mesh, boom.assembly, clamp, basis.Phi, {.markers = {"tip"}});
+  apply_damping(all, {"rayleigh", 0, 0.3, 2e-5});
+  const std::vector<int> list = {4, 0, 3};
+  const ModalBasis chosen = selected(basis, list);
+  ReducedBody direct = reduce(boom.mesh, boom.assembly, chosen, "boom");
+  direct.Kg = geometric_stiffness(boom.mesh, boom.assembly, clamp, chosen.Phi, {.markers = {"tip"}});
+  apply_damping(direct, {"rayleigh", 0, 0.3, 2e-5});
+  const ReducedBody body = selected(all, list);
+  body.validate();
+  // The same sums over the same points, in blocks of another size; some are zero by symmetry.
+  const auto near = [mass = all.m](const MatrixXd& A, const MatrixXd& B) {
+    EXPECT_LE((A - B).norm(), 1e-13 * (B.norm() + mass));
+  };
+  near(body.gram, direct.gram), near(body.Ke, direct.Ke), near(body.De, direct.De), near(body.Me, direct.Me);
+  near(body.Ct, direct.Ct), near(body.Cr0, direct.Cr0), near(body.Cr1[1], direct.Cr1[1]);
+  near(body.J1[2], direct.J1[2]), near(body.J2[0][2], direct.J2[0][2]), near(body.Kg.spin[5], direct.Kg.spin[5]);
+  near(body.Kg.markers[0].force[0], direct.Kg.markers[0].force[0]);
+  near(marker(body, "tip").S_theta, marker(direct, "tip").S_theta), near(body.display.S[3], direct.display.S[3]);
+  EXPECT_EQ(body.coordinates[0].frequency_hz, basis.coordinates[4].frequency_hz);
+  EXPECT_THROW(selected(all, {6}), InputError);
 }
 
 TEST(ModeSelection, ByEffectiveMassTakesTheFewest) {

@@ -60,6 +60,24 @@ TEST(ReducedBody, EveryWrongSizeNamesItsField) {
       {"coordinates", [](ReducedBody& b) { b.coordinates.clear(); }},
       {"marker \"tip\" S", [](ReducedBody& b) { b.markers[0].S.resize(3, 0); }},
       {"display.S", [](ReducedBody& b) { b.display.S.pop_back(); }},
+      {"markers has \"tip\" twice", [](ReducedBody& b) { b.markers.push_back(b.markers[0]); }},
+      {"interfaces has \"root\" twice",
+       [](ReducedBody& b) {
+         b.interfaces = {{.name = "root"}, {.name = "root"}};
+       }},
+      {"interface \"tip\"", [](ReducedBody& b) { b.interfaces = {{.name = "tip", .first_coordinate = 0}}; }},
+      {"interface \"tip\"", [](ReducedBody& b) { b.interfaces = {{.name = "tip", .first_coordinate = -2}}; }},
+      {"Kg.spin", [](ReducedBody& b) { b.Kg.spin = {b.Ke}; }},
+      {"Kg.acceleration", [](ReducedBody& b) { b.Kg.acceleration.assign(3, Eigen::MatrixXd::Zero(2, 2)); }},
+      {"Kg.angular_acceleration", [](ReducedBody& b) { b.Kg.angular_acceleration.assign(2, b.Ke); }},
+      {"Kg of marker \"tipp\"",
+       [](ReducedBody& b) {
+         b.Kg.markers = {{"tipp", {}, {}}};
+       }},
+      {"Kg of marker \"tip\" torque",
+       [](ReducedBody& b) {
+         b.Kg.markers = {{"tip", {}, {b.Ke}}};
+       }},
   };
   EXPECT_NO_THROW(sample().validate());
   for (const auto& [field, damage] : faults) {

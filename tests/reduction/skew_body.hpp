@@ -1,9 +1,9 @@
 #pragma once
 
-#include "fem/check.hpp"
 #include "reduction/inertia_invariants.hpp"
 #include "reduction/tilde.hpp"
 #include "tests/reduction/booms.hpp"
+#include "tests/reduction/messages.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -15,7 +15,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -41,16 +40,6 @@ inline int run_python(const std::string& script, const std::filesystem::path& ar
   const std::string command =
       std::string(FLEXBOOM_PYTHON) + " " + FLEXBOOM_TEST_DATA + "/reduction/" + script + " " + argument.string();
   return std::system(command.c_str());
-}
-
-/// The message of the InputError that `f` throws, empty if it throws none.
-inline std::string message(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
 }
 
 inline bool says(const std::vector<std::string>& sentences, const std::string& word) {

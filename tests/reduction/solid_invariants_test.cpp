@@ -1,0 +1,173 @@
+#include "fem/solid_boom.hpp"
+#include "reduction/inertia_invariants.hpp"
+#include "tests/reduction/booms.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <string>
+
+// Invariants of solids against a solid that is converged, and against beams.
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// A stub of round bar, d = 10 mm. nu = 0: the clamped face keeps its shape, so that its rim is not singular.
+BeamGeometry stub(double length, double nu) {
+  BeamGeometry g = test::boom4(BeamTheory::timoshenko, true, 4, 8);
+  g.segments[0].length = length;
+  g.segments[0].material.nu = nu;
+  return g;
+}
+
+struct Solid {
+  ReducedBody body;
+  int unknowns = 0;
+};
+
+/// Orders are even: only then a node lies in the middle of the tip, whose deflection aligns pairs of modes.
+Solid solid(double length, double nu, int order, const SolidGrading& grading, int modes = 5) {
+  SolidOptions options;
+  options.order = order;
+  options.grading = grading;
+  const Mesh mesh = make_solid_mesh(stub(length, nu), options);
+  const Assembly assembly = assemble(mesh, 2);
+  const ModalBasis basis =
+      clamped_modes(mesh, assembly, node_set(mesh, "root"), {.num_modes = modes, .sigma = {}, .backend = "auto"}, 2);
+  return {reduce(mesh, assembly, basis, "solid", 2), basis.unknowns};
+}
+
+/// Every invariant as one matrix, its modes scaled to Me_kk = m. (Modes come with the tip's deflection at one node,
+/// which converges more slowly than any integral.)
+std::map<std::string, MatrixXd> invariants(const ReducedBody& b) {
+  const Index n = b.n();
+  const Eigen::VectorXd s = (b.Me.diagonal() / b.m).cwiseSqrt().cwiseInverse();
+  std::map<std::string, MatrixXd> all;
+  all["m"] = MatrixXd::Constant(1, 1, b.m);
+  all["mc0"] = b.mc0;
+  all["J0"] = b.J0;
+  all["Ct"] = b.Ct * s.asDiagonal();
+  all["Cr0"] = b.Cr0 * s.asDiagonal();
+  all["Me"] = s.asDiagonal() * b.Me * s.asDiagonal();
+  all["Ke"] = s.asDiagonal() * b.Ke * s.asDiagonal();
+  MatrixXd &Cr1 = all["Cr1"], &J1 = all["J1"], &J2 = all["J2"];
+  Cr1.resize(3, n * n), J1.resize(3, 3 * n), J2.resize(3, 3 * n * n);
+  for (Index k = 0; k < n; ++k) {
+    const auto kk = static_cast<size_t>(k);
+    Cr1.middleCols(k * n, n) = s(k) * b.Cr1[kk] * s.asDiagonal();
+    J1.middleCols<3>(3 * k) = s(k) * b.J1[kk];
+    for (Index l = 0; l < n; ++l) J2.middleCols<3>(3 * (k * n + l)) = s(k) * s(l) * b.J2[kk][static_cast<size_t>(l)];
+  }
+  return all;
+}
+
+/// Largest deviation of each invariant, relative to its largest entry.
+std::map<std::string, double> errors(const ReducedBody& body, const ReducedBody& reference) {
+  const auto A = invariants(body), B = invariants(reference);
+  std::map<std::string, double> result;
+  for (const auto& [name, exact] : B)
+    result[name] = (A.at(name) - exact).cwiseAbs().maxCoeff() / exact.cwiseAbs().maxCoeff();
+  return result;
+}
+
+void print(const char* what, const std::map<std::string, double>& errors) {
+  std::printf("%s:", what);
+  for (const auto& [name, error] : errors) std::printf(" %s %.1e", name.c_str(), error);
+  std::printf("\n");
+}
+
+// Order 4 with one element per quarter: what limits it is its circle, whose area is wrong by 3e-6.
+TEST(SolidInvariants, AreThoseOfAConvergedSolid) {
+  const auto grading = [](int corners) {
+    return SolidGrading{.sectors = 1,
+                        .rings = 1,
+                        .long_elements = 4,
+                        .end_layers = 2,
+                        .first_layer = 1,
+                        .growth = 2,
+                        .corner_levels = corners,
+                        .factor = 0.2};
+  };
+  const auto found = errors(solid(0.05, 0, 4, grading(0), 2).body, solid(0.05, 0, 6, grading(1), 2).body);
+  print("order 4 against 6", found);
+  EXPECT_NEAR(found.at("m"), 3e-6, 1e-7);
+  for (const auto& [name, error] : found) EXPECT_LT(error, 6e-6) << name;
+}
+
+TEST(SlowSolidInvariants, AreThoseOfAConvergedSolidToEightDigits) {
+  const auto grading = [](int along, int layers, double first, int corners) {
+    return SolidGrading{.sectors = 1,
+                        .rings = 1,
+                        .long_elements = along,
+                        .end_layers = layers,
+                        .first_layer = first,
+                        .growth = 2,
+                        .corner_levels = corners,
+                        .factor = 0.2};
+  };
+  const Solid reference = solid(0.05, 0, 8, grading(6, 3, 0.7, 3)), nearly = solid(0.05, 0, 8, grading(6, 3, 0.7, 2)),
+              body = solid(0.05, 0, 6, grading(8, 2, 1, 2));
+  std::printf("unknowns %d, %d, reference %d\n", body.unknowns, nearly.unknowns, reference.unknowns);
+  const auto own = errors(nearly.body, reference.body), found = errors(body.body, reference.body);
+  print("reference against one level less at its rim", own);
+  print("order 6", found);
+  for (const auto& [name, error] : found) EXPECT_LT(error, 1e-8) << name;
+  for (const auto& [name, error] : own) EXPECT_LT(error, 1e-9) << name;
+}
+
+/// nu = 0: beams with shear and rotary inertia differ from solids by the clamp, where shear cannot warp the section.
+/// That is so in a layer as long as the section is deep, with shear strain of order d / L: together (d / L)^3.
+TEST(SolidInvariants, ApproachThoseOfBeamsWithSlenderness) {
+  std::map<std::string, double> last;
+  for (const double length : {0.05, 0.1}) {
+    const SolidGrading grading = {.sectors = 1,
+                                  .rings = 1,
+                                  .long_elements = length < 0.06 ? 3 : 5,
+                                  .end_layers = 1,
+                                  .first_layer = 1,
+                                  .growth = 2,
+                                  .corner_levels = 0,
+                                  .factor = 0.2};
+    const ReducedBody found = solid(length, 0, 6, grading, 2).body;
+    const test::Boom boom = test::make_boom(stub(length, 0));
+    const ModalBasis basis =
+        clamped_modes(boom.mesh, boom.assembly, node_set(boom.mesh, "root"), {.num_modes = 2, .sigma = {}});
+    const auto now = errors(found, reduce(boom.mesh, boom.assembly, basis, "beam"));
+    print(("beam, length " + std::to_string(length)).c_str(), now);
+    if (!last.empty()) {
+      for (const char* name : {"Ct", "Cr0", "J1", "Ke"}) EXPECT_NEAR(last.at(name) / now.at(name), 8, 1.5) << name;
+    }
+    last = now;
+  }
+}
+
+/// Stiff in shear and without rotary inertia, beams are eq. 14: see Reduce.LineMassBoomHasEveryInvariantOfEq14. The
+/// rotary inertia itself adds (d / L)^2.
+TEST(BeamInvariants, ApproachThoseOfALineMassWithSlenderness) {
+  std::map<std::string, double> last;
+  for (const double length : {0.1, 0.2, 0.4}) {
+    const auto body_of = [&](BeamTheory theory, bool rotary) {
+      BeamGeometry g = stub(length, 0);
+      g.theory = theory;
+      g.rotary_inertia = rotary;
+      const test::Boom boom = test::make_boom(g);
+      const ModalBasis basis = clamped_modes_of_kind(boom.mesh, boom.assembly, node_set(boom.mesh, "root"), 4,
+                                                     {ModeKind::bending_y, ModeKind::bending_z}, {});
+      return reduce(boom.mesh, boom.assembly, basis, "beam");
+    };
+    const auto now = errors(body_of(BeamTheory::timoshenko, true), body_of(BeamTheory::euler_bernoulli, false));
+    if (!last.empty()) {
+      for (const char* name : {"Ct", "Cr0", "J1", "J2", "Ke"})
+        EXPECT_NEAR(last.at(name) / now.at(name), 4, 0.8) << name;
+    }
+    last = now;
+  }
+}
+
+}  // namespace
+}  // namespace flexboom
