@@ -28,6 +28,7 @@ Model body_model(const std::filesystem::path& path, const ModelOptions& options)
   Model model;
   model.name = body.name;
   model.mesh = solid ? make_solid_mesh(body.geometry, body.solid) : make_mesh(body.geometry);
+  if (body.modes_given && !body.modes_auto && body.modes > 0) model.modes = body.modes;
   model.backend = body.backend;
   model.damping = body.damping;
   if (body.structure == "eq14")

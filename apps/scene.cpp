@@ -205,6 +205,7 @@ DampingRule read_damping(TableReader& table, const DampingRule& otherwise) {
 void read_model(TableReader& table, BodyScene& body) {
   body.structure = table.text("structure", body.structure);
   body.clamp = table.text("clamp", body.clamp);
+  body.modes_given = body.modes_given || table.has("modes");
   if (table.is_text("modes")) {
     body.modes_auto = table.text("modes") == "auto";
     if (!body.modes_auto) {

@@ -20,6 +20,7 @@ struct BodyScene {
       "beam";  // "beam", "solid": finite elements; "eq14": closed form (one uniform segment only); "rigid"
   std::string clamp = "root";              // node set that is fixed
   int modes = 2;                           // elastic coordinates kept
+  bool modes_given = false;                // by the file
   bool modes_auto = false;                 // modes = "auto": chosen from the accuracy wanted
   std::string directions = "hinge-plane";  // modes that count: "hinge-plane" (bending along y) or "all"
   BeamGeometry geometry;

@@ -24,7 +24,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double round_off = 1e-11;    // of sums over many points, relative to the largest of their kind
-constexpr double orthogonal = 1e-8;    // what eigen-solvers leave between modes
+constexpr double orthogonal = 1e-7;    // what eigen-solvers leave between modes: vectors good to 1e-6 of each other
 constexpr double static_error = 1e-8;  // of a static response that the basis holds
 
 /// value <= reference, or equal to `slack` of it.

@@ -696,6 +696,12 @@ class Modes(Case):
     def bending(self, document):
         return np.array([f for f, kind in zip(document["frequencies_hz"], document["kinds"]) if kind == "bending_y"])
 
+    def test_as_many_as_the_body_file_says(self):
+        body = self.folder / "three.toml"
+        body.write_text(BOOM4.read_text().replace("modes = 10", "modes = 3"))
+        self.assertEqual(len(self.modes(body)["frequencies_hz"]), 3)
+        self.assertEqual(len(self.modes(body, "--count", "5")["frequencies_hz"]), 5)
+
     def test_keys(self):
         document = self.modes(BOOM4)
         number = (int, float)
