@@ -1,5 +1,6 @@
 #include "dynamics/cvode.hpp"
 
+#include "dynamics/crossing.hpp"
 #include "dynamics/workspace.hpp"
 #include "fem/check.hpp"
 
@@ -46,6 +47,7 @@ class CvodeStepper final : public Stepper {
     const auto hinges = static_cast<int>(system.appendages().size());
     contact_.assign(static_cast<size_t>(hinges), 0);
     armed_.assign(static_cast<size_t>(hinges), 0);
+    before_.resize(armed_.size());
     y_.reset(N_VNew_Serial(n, context_.context));
     out_.reset(N_VNewEmpty_Serial(n, context_.context));
     make_linear_solver();
@@ -83,13 +85,18 @@ class CvodeStepper final : public Stepper {
   void step(double t_end, double& t, Eigen::VectorXd& y, std::span<int> crossed) override {
     check(CVodeSetStopTime(cvode_, t_end), "CVodeSetStopTime");
     realtype reached = t;
+    const double start = t;
+    for (size_t i = 0; i < armed_.size(); ++i) before_[i] = clearance(y, i);
     const int flag = CVode(cvode_, t_end, y_.get(), &reached, CV_ONE_STEP);
     if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
     check(flag, "CVode");
     t = reached;
     y = Eigen::Map<const Eigen::VectorXd>(N_VGetArrayPointer(y_.get()), y.size());
     std::fill(crossed.begin(), crossed.end(), 0);
-    if (flag == CV_ROOT_RETURN) check(CVodeGetRootInfo(cvode_, crossed.data()), "CVodeGetRootInfo");
+    if (flag == CV_ROOT_RETURN)
+      check(CVodeGetRootInfo(cvode_, crossed.data()), "CVodeGetRootInfo");
+    else
+      find_short_contacts(start, t, y, crossed);
   }
 
   void interpolate(double t, Eigen::VectorXd& y) override {
@@ -119,6 +126,42 @@ class CvodeStepper final : public Stepper {
       self.system_.solve_newton(N_VGetArrayPointer(b), *self.work_, N_VGetArrayPointer(x));
       return 0;
     };
+  }
+
+  /// Of the gap on the side of its flag; slope per second.
+  Clearance clearance(const Eigen::VectorXd& y, size_t i) const {
+    const double side = contact_[i] ? 1 : -1;
+    const int hinge = static_cast<int>(i);
+    return {0, side * system_.gap(y.data(), hinge), side * system_.gap_rate(y.data(), hinge)};
+  }
+
+  /// CVODE looks at the signs at both ends of a step: a contact that begins and ends within it is found here.
+  void find_short_contacts(double start, double& t, Eigen::VectorXd& y, std::span<int> crossed) {
+    const double length = t - start, resolution = 4e-16 * t;
+    double first = length;
+    Eigen::VectorXd& state = between_;
+    state.resize(y.size());
+    for (size_t i = 0; i < armed_.size(); ++i) {
+      if (!armed_[i] || !(before_[i].slope < 0)) continue;
+      Clearance to = clearance(y, i);
+      to.c = length;
+      if (!(to.slope > 0) || to.value < 0) continue;
+      const auto at = [&](double c) {
+        interpolate(start + c, state);
+        Clearance here = clearance(state, i);
+        here.c = c;
+        return here;
+      };
+      const double root = crossing_between(at, before_[i], to, resolution);
+      if (root >= first) continue;
+      std::fill(crossed.begin(), crossed.end(), 0);
+      crossed[i] = contact_[i] ? -1 : 1;
+      first = root;
+    }
+    if (first == length) return;
+    t = start + first;
+    interpolate(t, state);
+    y = state;
   }
 
   static int rhs(realtype, N_Vector y, N_Vector y_dot, void* user) noexcept {
@@ -197,6 +240,8 @@ class CvodeStepper final : public Stepper {
   SUNLinearSolver solver_ = nullptr;
   void* cvode_ = nullptr;
   std::vector<char> contact_, armed_;
+  std::vector<Clearance> before_;  // at the start of a step
+  Eigen::VectorXd between_;        // a state within one
   std::exception_ptr error_;
   StepCounts past_;
   long jacobians_ = 0;

@@ -1,5 +1,6 @@
 #include "dynamics/exponential.hpp"
 
+#include "dynamics/crossing.hpp"
 #include "dynamics/linear_part.hpp"
 #include "dynamics/rotation.hpp"
 #include "dynamics/workspace.hpp"
@@ -90,7 +91,10 @@ class ExponentialStepper final : public Stepper {
       }
       ++counts_.error_test_failures;
       if (!(used_ > 1e-14 * std::max(1.0, std::abs(t_))))
-        throw NumericalError(fmt::format("exponential: no step is small enough at t = {:.9g} s", t_));
+        throw NumericalError(
+            fmt::format("exponential: no step is small enough at t = {:.9g} s; eigenvalues reach {:.2g} 1/s, whose "
+                        "round-off may be more than the tolerance: fewer modes, or a coarser one",
+                        t_, linear_->lambda.cwiseAbs().maxCoeff()));
       h_ = std::isfinite(error) ? smaller(error) : used_ / (rung * rung);
       if (!std::isfinite(error)) relinearise();
     }
@@ -141,7 +145,7 @@ class ExponentialStepper final : public Stepper {
 
   void relinearise() {
     const VectorXd p = start_.head(layout_.p);
-    if ((linear_->base - p).norm() <= 1e-3 * std::max(linear_->base.norm(), p.norm())) return;
+    if ((linear_->base - p).norm() <= 1e-9 * std::max(linear_->base.norm(), p.norm())) return;
     linear_parts_[contact_] = make_linear_part(p);
     linear_ = linear_parts_[contact_].get();
     begin(start_);
@@ -320,12 +324,7 @@ class ExponentialStepper final : public Stepper {
     y.segment<3>(layout_.position()) = start_.segment<3>(layout_.position()) + c * used_ * v0 + A * dr;
   }
 
-  /// Distance of a hinge from its stop on the side where its flag says that it is (negative: it has crossed), and the
-  /// change of that per step, at a fraction c.
-  struct Clearance {
-    double c = 0, value = 0, slope = 0;
-  };
-
+  /// The value and its change per step at a fraction c.
   Clearance clearance(int hinge, double c) {
     linear_->point(c, used_, scratch_);
     linear_->combine(scratch_, 0, Z_.col(0), M_, integral_);
@@ -346,7 +345,7 @@ class ExponentialStepper final : public Stepper {
     roots_.clear();
     end_ = 1;
     for (int i = 0; i < static_cast<int>(armed_.size()); ++i) {
-      const double root = armed_[static_cast<size_t>(i)] ? first_crossing(i) : 2;
+      const double root = armed_[static_cast<size_t>(i)] ? first_crossing(i) : no_crossing;
       if (root > 1) continue;
       roots_.emplace_back(i, root);
       end_ = std::min(end_, root);
@@ -381,9 +380,11 @@ class ExponentialStepper final : public Stepper {
     return r;
   }
 
-  /// The first fraction of the step where the gap leaves the side of its flag, or 2.
+  /// The first fraction of the step where the gap leaves the side of its flag, or no_crossing.
   double first_crossing(int i) {
     const Ripple ripples = ripple(i);
+    const auto at = [&](double c) { return clearance(i, c); };
+    const double resolution = 4e-16 * std::max(1.0, std::abs(t_) / used_);
     Clearance from = clearance_at_point(i, 0);
     for (int j = 1; j < points; ++j) {
       const Clearance to = clearance_at_point(i, j);
@@ -392,49 +393,13 @@ class ExponentialStepper final : public Stepper {
       const int parts = clear ? 1 : static_cast<int>(std::clamp(std::ceil(ripples.turn * width), 1.0, 64.0));
       for (int part = 1; part <= parts; ++part) {
         const Clearance next = part == parts ? to : clearance(i, start + width * part / parts);
-        const double root = crossing_between(i, from, next);
+        const double root = crossing_between(at, from, next, resolution);
         if (root <= 1) return root;
-        if (root > 2) return 2;
+        if (root == crossed_from_the_start) return no_crossing;
         from = next;
       }
     }
-    return 2;
-  }
-
-  /// The first crossing between two places near each other; 2: none, 3: it has been on the wrong side from the start.
-  double crossing_between(int i, const Clearance& from, const Clearance& to) {
-    if (to.value < 0) {
-      if (from.value > 0) return root_between(i, from.c, to.c);
-      if (from.slope <= 0) return 3;
-      for (double c = 0.5 * (from.c + to.c), tries = 0; tries < 60; c = 0.5 * (from.c + c), ++tries)
-        if (clearance(i, c).value > 0) return root_between(i, c, to.c);  // it starts on the stop and comes off
-      return 3;
-    }
-    if (!(from.slope < 0 && to.slope > 0)) return 2;
-    // A dip: the lowest point of the cubic through both values and slopes.
-    const double width = to.c - from.c, d0 = from.slope * width, d1 = to.slope * width;
-    const double c3 = 2 * (from.value - to.value) + d0 + d1, c2 = 3 * (to.value - from.value) - 2 * d0 - d1;
-    const double root = c2 * c2 - 3 * c3 * d0;
-    if (root < 0) return 2;
-    const double s = std::clamp(-d0 / (c2 + std::sqrt(root)), 0.0, 1.0);
-    if (from.value + s * (d0 + s * (c2 + s * c3)) > 0.1 * std::min(from.value, to.value)) return 2;
-    const double lowest = from.c + s * width;
-    return lowest > from.c && clearance(i, lowest).value < 0 ? root_between(i, from.c, lowest) : 2;
-  }
-
-  /// Newton in a bracket: clear at a, crossed at b.
-  double root_between(int i, double a, double b) {
-    double c = b;
-    for (int round = 0; round < 100; ++round) {
-      const Clearance here = clearance(i, c);
-      (here.value < 0 ? b : a) = c;
-      double next = here.slope < 0 ? c - here.value / here.slope : 0.5 * (a + b);
-      if (!(next > a && next < b)) next = 0.5 * (a + b);
-      const double moved = std::abs(next - c);
-      c = next;
-      if (moved <= 4e-16 * std::max(c, std::abs(t_) / used_) || b - a <= 4e-16 * b) break;
-    }
-    return c;
+    return no_crossing;
   }
 
   const System& system_;

@@ -1,5 +1,6 @@
 #include "dynamics/system.hpp"
 
+#include "dynamics/hub_check.hpp"
 #include "dynamics/rotation.hpp"
 #include "dynamics/workspace.hpp"
 #include "fem/check.hpp"
@@ -173,6 +174,7 @@ System::System(ReducedBody hub, std::vector<Appendage> appendages, bool fixed_hu
     l.p += 1 + body.n;
     s.model.bodies.push_back(std::move(body));
   }
+  if (!fixed_hub) check_hub_inertia(s.model);
   l.u = l.base + l.p;
   l.size = l.p + l.u + (fixed_hub ? 0 : 3 + 4 + 3) + 1;
   s.hub = std::move(hub);
