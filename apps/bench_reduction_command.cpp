@@ -170,22 +170,6 @@ Plot plot_of_invariants(const std::vector<InvariantsBench>& rows) {
   return plot;
 }
 
-/// Plots one below the other.
-std::string picture_of(const std::vector<Plot>& plots) {
-  int height = 0;
-  std::string content;
-  for (const Plot& plot : plots) {
-    if (plot.curves.empty()) continue;
-    content += fmt::format("<g transform=\"translate(0 {})\">{}</g>\n", height, svg(plot));
-    height += plot.height;
-  }
-  const int width = Plot{}.width;
-  return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\">\n"
-      "{2}</svg>\n",
-      width, height, content);
-}
-
 }  // namespace
 
 int bench_reduction_command(const BenchArguments& a, const CommonOptions& common) {
@@ -200,8 +184,8 @@ int bench_reduction_command(const BenchArguments& a, const CommonOptions& common
   if (table) print_invariants(bench.invariants);
   write_file(folder / "bench_reduction.csv", csv_of(bench.rows));
   write_file(folder / "bench_reduction_invariants.csv", csv_of(bench.invariants));
-  write_file(folder / "bench_reduction.svg", picture_of({plot_of_time(bench.rows), plot_of_truncation(bench.rows),
-                                                         plot_of_invariants(bench.invariants)}));
+  write_file(folder / "bench_reduction.svg",
+             stacked({plot_of_time(bench.rows), plot_of_truncation(bench.rows), plot_of_invariants(bench.invariants)}));
   if (common.json) fmt::print("{}\n", json_of(bench).dump(2));
   if (!common.quiet) print_note(fmt::format("tables and picture: {}", (folder / "bench_reduction.svg").string()));
   return exit_ok;

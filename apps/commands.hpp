@@ -84,7 +84,8 @@ struct ExportArguments {
 
 struct BenchArguments {
   std::string what;
-  double longest = 60;  // [s] per row; larger models are left out
+  double longest = 60;              // [s] per row; larger models are left out
+  std::vector<std::string> scenes;  // of transient; empty: its own
 };
 
 struct CompareArguments {
@@ -105,6 +106,7 @@ int inspect_command(const std::filesystem::path& body, const CommonOptions&);
 int export_command(const ExportArguments&, const CommonOptions&);
 int bench_modes_command(const BenchArguments&, const CommonOptions&);
 int bench_reduction_command(const BenchArguments&, const CommonOptions&);
+int bench_transient_command(const BenchArguments&, const CommonOptions&);
 int compare_command(const CompareArguments&, const CommonOptions&);
 int report_command(const std::filesystem::path& folder, const CommonOptions&);
 

@@ -157,11 +157,16 @@ struct CommandLine {
   }
 
   void add_bench() {
-    CLI::App* c = command("bench", "speed against error, measured: modes, reduction");
-    c->add_option("WHAT", bench.what, "modes or reduction")->required()->check(CLI::IsMember({"modes", "reduction"}));
+    CLI::App* c = command("bench", "speed against error, measured: modes, reduction, transient");
+    c->add_option("WHAT", bench.what, "modes, reduction or transient")
+        ->required()
+        ->check(CLI::IsMember({"modes", "reduction", "transient"}));
+    c->add_option("SCENE", bench.scenes, "Of transient: scenes instead of its own four");
     c->add_option("--longest", bench.longest, "Leave out models that would take longer than this [s]");
     c->callback([this] {
-      const auto command = bench.what == "modes" ? bench_modes_command : bench_reduction_command;
+      const auto command = bench.what == "modes"       ? bench_modes_command
+                           : bench.what == "reduction" ? bench_reduction_command
+                                                       : bench_transient_command;
       action = [this, command] { return command(bench, common); };
     });
   }

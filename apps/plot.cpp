@@ -141,4 +141,19 @@ std::string svg(const Plot& p) {
   return s + "</svg>\n";
 }
 
+std::string stacked(const std::vector<Plot>& plots) {
+  int height = 0;
+  std::string content;
+  for (const Plot& plot : plots) {
+    if (plot.curves.empty()) continue;
+    content += fmt::format("<g transform=\"translate(0 {})\">{}</g>\n", height, svg(plot));
+    height += plot.height;
+  }
+  const int width = Plot{}.width;
+  return fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\">\n"
+      "{2}</svg>\n",
+      width, height, content);
+}
+
 }  // namespace flexboom

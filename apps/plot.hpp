@@ -25,4 +25,7 @@ std::string escaped(const std::string&);
 /// each bin are kept).
 std::string svg(const Plot&);
 
+/// Plots one below the other, those without curves left out, as one <svg> element.
+std::string stacked(const std::vector<Plot>&);
+
 }  // namespace flexboom

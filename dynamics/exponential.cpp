@@ -77,7 +77,7 @@ class ExponentialStepper final : public Stepper {
   void step(double t_end, double& t, VectorXd& y, std::span<int> crossed) override {
     std::ranges::fill(crossed, 0);
     if (pending_) advance_start();
-    for (;;) {
+    for (int failures = 0;; ++failures) {
       const double left = t_end - t_;
       const bool last = h_ >= left * (1 - 1e-12);
       used_ = last ? left : h_;
@@ -96,7 +96,7 @@ class ExponentialStepper final : public Stepper {
                         "round-off may be more than the tolerance: fewer modes, or a coarser one",
                         t_, linear_->lambda.cwiseAbs().maxCoeff()));
       h_ = std::isfinite(error) ? smaller(error) : used_ / (rung * rung);
-      if (!std::isfinite(error)) relinearise();
+      if (!std::isfinite(error)) relinearise(failures < 6 ? 1e-3 : 1e-9);
     }
     follow();
     locate(crossed);
@@ -143,9 +143,10 @@ class ExponentialStepper final : public Stepper {
     return std::make_unique<LinearPart>(std::move(J), work_->dahub, system_.fixed_hub() ? -1 : layout_.p, p);
   }
 
-  void relinearise() {
+  /// Takes L where the step starts, unless it was taken near there (a part of p): that costs as much as some steps.
+  void relinearise(double near) {
     const VectorXd p = start_.head(layout_.p);
-    if ((linear_->base - p).norm() <= 1e-9 * std::max(linear_->base.norm(), p.norm())) return;
+    if ((linear_->base - p).norm() <= near * std::max(linear_->base.norm(), p.norm())) return;
     linear_parts_[contact_] = make_linear_part(p);
     linear_ = linear_parts_[contact_].get();
     begin(start_);

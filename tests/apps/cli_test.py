@@ -683,6 +683,25 @@ class Solids(Case):
         self.assertEqual(sum(name.startswith("mode_") for name in fields), 6)
 
 
+class Bench(Case):
+    def test_transient_of_a_scene(self):
+        scene = self.folder / "short.toml"
+        scene.write_text((MESHES / "sport.toml").read_text().replace("duration = 10.0", "duration = 0.2"))
+        out = self.folder / "out"
+        result = flexboom("bench", "transient", scene, "--longest", "0.001", "--json", "--out", out)
+        self.assert_exit(OK, result)
+        rows = json.loads(result.stdout)
+        self.assertEqual({row["method"] for row in rows}, {"exponential", "bdf", "adams"})
+        for row in rows:
+            self.assertLess(row["error"], 0.2, row)  # of a coarse tolerance, just after a contact
+            self.assertLess(row["hub_error"], 0.01, row)
+        self.assertIn("exponential", (out / "bench_transient.csv").read_text())
+        self.assertIn("<svg", (out / "bench_transient.svg").read_text())
+
+    def test_unknown_bench(self):
+        self.assert_exit(USAGE, flexboom("bench", "nonsense"))
+
+
 class Modes(Case):
     def modes(self, *arguments):
         result = flexboom("modes", *arguments, "--json")

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// One flight of one scene by one method.
+struct TransientBench {
+  std::string scene;  // "sport", ...
+  std::string method;
+  double tolerance = 0;  // asked for
+  double seconds = 0;    // of the integration, the least of up to five within half a second
+  double error = 0;      // largest of all outputs (max over time of the difference over max of the output)
+  double hub_error = 0;  // of hub.rotation
+  double energy = 0;     // energy balance
+  double simulated = 0;  // [s]
+  long steps = 0, evaluations = 0, events = 0;
+  std::string failure;  // why there is nothing above
+};
+
+/// Work against precision: every method on the scenes named (paths or built-in), or else on SPORT with 2 and with 8
+/// modes per boom, without damping, and tumbling, at tolerances 1e-2 to 1e-9. Reference of a scene: another method than
+/// the one judged, at 1e-11 (bdf, or adams where nothing is damped; for that one, exponential). A method ends where its
+/// next tolerance would take longer than `longest` seconds. Calls `seen` after each row.
+std::vector<TransientBench> bench_transient(const std::vector<std::string>& scenes, double longest,
+                                            const std::function<void(const TransientBench&)>& seen);
+
+}  // namespace flexboom
