@@ -169,6 +169,7 @@ class ExponentialStepper final : public Stepper {
     Z_.resize(m, points);
     N_.resize(m, points);
     integral_.resize(m);
+    amplitude_.resize(linear_->lambda.size());
     Z_.col(0).noalias() = linear_->to_modes * y.head(nx_);
     X_.col(0) = y.head(nx_);
     evaluate(0);
@@ -205,7 +206,7 @@ class ExponentialStepper final : public Stepper {
     double last_change = 0;
     for (int sweep = 0; sweep < max_sweeps; ++sweep) {
       M_.noalias() = used_ * N_ * scaled_coefficients_;
-      for (int j = 1; j < points; ++j) linear_->combine((*grid_)[static_cast<size_t>(j)], 0, Z_.col(0), M_, Z_.col(j));
+      for (int j = 1; j < points; ++j) linear_->combine(grid_->at[static_cast<size_t>(j)], 0, Z_.col(0), M_, Z_.col(j));
       previous_ = X_.col(degree);
       small_product(linear_->from_modes, Z_.rightCols(degree), X_.rightCols(degree));
       const double change = sweep == 0 ? std::numeric_limits<double>::infinity() : norm(X_.col(degree) - previous_);
@@ -225,7 +226,7 @@ class ExponentialStepper final : public Stepper {
     zero_.setZero(m);
     z_error_.resize(m);
     M_error_.noalias() = used_ * error_modes_ * middle_.transpose();
-    linear_->combine((*grid_)[degree], 0, zero_, M_error_, z_error_);
+    linear_->combine(grid_->at[degree], 0, zero_, M_error_, z_error_);
     double error = norm(linear_->from_modes * z_error_);
     const double weight = used_ * collocation::middle_polynomial().dot(collocation::integrals(1));
     const double lost = std::abs(power_.dot(d)) * weight;
@@ -279,7 +280,7 @@ class ExponentialStepper final : public Stepper {
     omega = X_.middleRows<3>(layout_.p);
     theta0.col(0).setZero();
     for (int j = 1; j < points; ++j) {
-      linear_->combine((*grid_)[static_cast<size_t>(j)], 1, Z_.col(0), M_, integral_);
+      linear_->combine(grid_->at[static_cast<size_t>(j)], 1, Z_.col(0), M_, integral_);
       theta0.col(j).noalias() = used_ * (linear_->omega_modes.lazyProduct(integral_));
     }
     theta = theta0;
@@ -303,7 +304,7 @@ class ExponentialStepper final : public Stepper {
 
   /// The state at a fraction c of the step.
   void state_at(double c, VectorXd& y) {
-    const GridPoint* at = &(*grid_)[degree];
+    const GridPoint* at = &grid_->at[degree];
     if (c != 1) linear_->point(c, used_, scratch_), at = &scratch_;
     y.resize(layout_.size);
     linear_->combine(*at, 0, Z_.col(0), M_, integral_);
@@ -328,7 +329,11 @@ class ExponentialStepper final : public Stepper {
   /// The value and its change per step at a fraction c.
   Clearance clearance(int hinge, double c) {
     linear_->point(c, used_, scratch_);
-    linear_->combine(scratch_, 0, Z_.col(0), M_, integral_);
+    return clearance_at(hinge, c, scratch_);
+  }
+
+  Clearance clearance_at(int hinge, double c, const GridPoint& point) {
+    linear_->combine(point, 0, Z_.col(0), M_, integral_);
     const int at = layout_.body[static_cast<size_t>(hinge)], rate = layout_.p + layout_.base + at;
     const double side = contact_[static_cast<size_t>(hinge)] ? 1 : -1;
     return {c, side * linear_->from_modes.row(at).dot(integral_),
@@ -362,21 +367,23 @@ class ExponentialStepper final : public Stepper {
     double amplitude = 0;  // all of it, at the start
   };
 
-  Ripple ripple(int hinge) const {
+  Ripple ripple(int hinge) {
     const Index m = linear_->lambda.size();
     const int at = layout_.body[static_cast<size_t>(hinge)];
-    const auto amplitude = [&](Index k) {
-      return std::hypot(linear_->from_modes(at, k), linear_->from_modes(at, m + k)) *
-             std::hypot(Z_(k, 0), Z_(m + k, 0));
-    };
+    const auto squared = [](double a, double b) { return a * a + b * b; };
     double fastest = 0;
-    for (Index k = 0; k < m; ++k) fastest = std::max(fastest, std::abs(linear_->lambda[k]) * amplitude(k));
+    for (Index k = 0; k < m; ++k) {
+      amplitude_[k] = std::sqrt(squared(linear_->from_modes(at, k), linear_->from_modes(at, m + k)) *
+                                squared(Z_(k, 0), Z_(m + k, 0)));
+      fastest = std::max(fastest, std::norm(linear_->lambda[k]) * amplitude_[k] * amplitude_[k]);
+    }
     Ripple r;
     for (Index k = 0; k < m; ++k) {
       const double turn = linear_->lambda[k].imag() * used_;
-      if (turn < 2 || std::abs(linear_->lambda[k]) * amplitude(k) < 0.02 * fastest) continue;  // too slow a part
+      const double rate = std::norm(linear_->lambda[k]) * amplitude_[k] * amplitude_[k];
+      if (turn < 2 || rate < 4e-4 * fastest) continue;  // slow, or less than a fiftieth of the largest rate
       r.turn = std::max(r.turn, turn);
-      r.amplitude += amplitude(k);
+      r.amplitude += amplitude_[k];
     }
     return r;
   }
@@ -389,11 +396,15 @@ class ExponentialStepper final : public Stepper {
     Clearance from = clearance_at_point(i, 0);
     for (int j = 1; j < points; ++j) {
       const Clearance to = clearance_at_point(i, j);
-      const double start = from.c, width = to.c - start;
       const bool clear = std::min(from.value, to.value) > 2 * ripples.amplitude;
-      const int parts = clear ? 1 : static_cast<int>(std::clamp(std::ceil(ripples.turn * width), 1.0, 64.0));
+      const double turn = ripples.turn * (to.c - from.c);
+      const int level = clear || turn < 1 ? 0 : std::min(6, static_cast<int>(std::ceil(std::log2(turn))));
+      const std::vector<GridPoint>& between = linear_->between(*grid_, used_, j, level);
+      const int parts = 1 << level;
       for (int part = 1; part <= parts; ++part) {
-        const Clearance next = part == parts ? to : clearance(i, start + width * part / parts);
+        const Clearance next = part == parts ? to
+                                             : clearance_at(i, collocation::between(j, part, parts),
+                                                            between[static_cast<size_t>(part) - 1]);
         const double root = crossing_between(at, from, next, resolution);
         if (root <= 1) return root;
         if (root == crossed_from_the_start) return no_crossing;
@@ -412,7 +423,7 @@ class ExponentialStepper final : public Stepper {
   std::map<std::vector<char>, std::unique_ptr<LinearPart>> linear_parts_;
   LinearPart* linear_ = nullptr;
   Grid spare_;
-  const Grid* grid_ = nullptr;
+  Grid* grid_ = nullptr;
   GridPoint scratch_;
 
   double t_ = 0, h_ = 0, used_ = 0, end_ = 1, last_used_ = 0, reached_ = 0, contraction_ = 0.1;
@@ -420,7 +431,7 @@ class ExponentialStepper final : public Stepper {
   VectorXd start_, reached_state_;
   VectorXd y_, y_dot_, previous_;
   MatrixXd F_, X_, Z_, N_, M_, last_N_, M_error_;
-  VectorXd error_modes_, z_error_, zero_, integral_;
+  VectorXd error_modes_, z_error_, zero_, integral_, amplitude_;
   Points power_ = Points::Zero(), power_coefficients_ = Points::Zero();
   Points middle_ = Points::Zero();
   collocation::Table scaled_coefficients_;

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <map>
+#include <vector>
 
 namespace flexboom {
 
@@ -13,8 +14,12 @@ namespace flexboom {
 /// real parts in the upper half, imaginary parts in the lower.
 using GridPoint = Eigen::MatrixXd;
 
-/// At every collocation point.
-using Grid = std::array<GridPoint, collocation::points>;
+/// At every collocation point, and between them where somebody looked: `between[j][l]` parts the interval that ends at
+/// point j in 2^l.
+struct Grid {
+  std::array<GridPoint, collocation::points> at;
+  std::array<std::vector<std::vector<GridPoint>>, collocation::points> between;
+};
 
 /// L of x' = L x + N(x), x = (p, u), in its eigenvectors: x = from_modes z, z = to_modes x. Of a complex pair one is
 /// kept; z holds real parts, then imaginary parts.
@@ -32,7 +37,10 @@ struct LinearPart {
 
   void point(double c, double h, GridPoint&) const;
   void grid(double h, Grid&) const;
-  const Grid& kept_grid(double h);  // kept for the next step of the same size
+  Grid& kept_grid(double h);  // kept for the next step of the same size
+
+  /// The points that part the interval before point j in 2^level.
+  const std::vector<GridPoint>& between(Grid&, double h, int j, int level) const;
 
   /// z at a point (shift 0), or its first or second integral from the start over h or h^2. M: the remainder's
   /// coefficients of c^m, times h m!.
