@@ -36,7 +36,6 @@ template <class At>
 double crossing_between(const At& at, const Clearance& from, const Clearance& to, double resolution) {
   if (to.value < 0) {
     if (from.value > 0) return crossing_in_bracket(at, from.c, to.c, resolution);
-    if (from.slope <= 0) return crossed_from_the_start;
     double c = 0.5 * (from.c + to.c);
     for (int tries = 0; tries < 60; ++tries, c = 0.5 * (from.c + c))
       if (at(c).value > 0) return crossing_in_bracket(at, c, to.c, resolution);  // it starts on the stop and comes off

@@ -1,8 +1,8 @@
 #include "dynamics/exponential.hpp"
 
-#include "dynamics/crossing.hpp"
 #include "dynamics/linear_part.hpp"
 #include "dynamics/rotation.hpp"
+#include "dynamics/stop_search.hpp"
 #include "dynamics/workspace.hpp"
 #include "fem/check.hpp"
 
@@ -23,6 +23,9 @@ using Eigen::VectorXd;
 
 constexpr int max_sweeps = 12;
 constexpr double rung = 1.4142135623730951;  // between step sizes
+
+/// The nearest of the step sizes that grids are kept for.
+double on_ladder(double h) { return std::exp2(std::round(2 * std::log2(h)) / 2); }
 
 /// d(rotation vector)/dt - omega, omega in body axes (Bortz 1971).
 Vector3d turning(const Vector3d& theta, const Vector3d& omega) {
@@ -47,16 +50,17 @@ class ExponentialStepper final : public Stepper {
         scale_(scale),
         work_(system.workspace()),
         nx_(layout_.p + layout_.u),
+        search_(layout_),
         y_(VectorXd::Zero(layout_.size)),
         y_dot_(layout_.size),
         F_(nx_, points),
-        X_(nx_, points),
         scaled_coefficients_(collocation::coefficients()) {
     double factorial = 1;
     for (int m = 0; m < points; ++m, factorial *= m) {
       scaled_coefficients_.col(m) *= factorial;
       middle_[m] = collocation::middle_polynomial()[m] * factorial;
     }
+    step_.X.resize(nx_, points);
     if (!system.fixed_hub()) y_[layout_.attitude()] = 1;
     if (!(scale.tolerance > 4e-16))
       throw NumericalError(fmt::format(
@@ -64,25 +68,25 @@ class ExponentialStepper final : public Stepper {
   }
 
   void restart(double t, const VectorXd& y, std::span<const char> contact, std::span<const char> armed) override {
-    t_ = t;
+    step_.start = t;
     pending_ = false;
     contact_.assign(contact.begin(), contact.end());
     armed_.assign(armed.begin(), armed.end());
-    linear_ = &linear_part();
+    step_.linear = &linear_part();
     begin(y);
     first_ = true;
-    h_ = linear_->step > 0 ? linear_->step : first_step();
+    h_ = step_.linear->step > 0 ? step_.linear->step : first_step();
   }
 
   void step(double t_end, double& t, VectorXd& y, std::span<int> crossed) override {
     std::ranges::fill(crossed, 0);
     if (pending_) advance_start();
     for (int failures = 0;; ++failures) {
-      const double left = t_end - t_;
+      const double left = t_end - step_.start;
       const bool last = h_ >= left * (1 - 1e-12);
-      used_ = last ? left : h_;
-      if (last) linear_->grid(used_, spare_);
-      grid_ = last ? &spare_ : &linear_->kept_grid(used_);
+      step_.length = last ? left : h_;
+      if (last) step_.linear->grid(step_.length, spare_);
+      step_.grid = last ? &spare_ : &step_.linear->kept_grid(step_.length);
       const double error = solve(left);
       if (error <= 1) {
         ++counts_.steps;
@@ -90,25 +94,28 @@ class ExponentialStepper final : public Stepper {
         break;
       }
       ++counts_.error_test_failures;
-      if (!(used_ > 1e-14 * std::max(1.0, std::abs(t_))))
+      if (!(step_.length > 1e-14 * std::max(1.0, std::abs(step_.start))))
         throw NumericalError(
             fmt::format("exponential: no step is small enough at t = {:.9g} s; eigenvalues reach {:.2g} 1/s, whose "
                         "round-off may be more than the tolerance: fewer modes, or a coarser one",
-                        t_, linear_->lambda.cwiseAbs().maxCoeff()));
-      h_ = std::isfinite(error) ? smaller(error) : used_ / (rung * rung);
+                        step_.start, step_.linear->lambda.cwiseAbs().maxCoeff()));
+      h_ = std::isfinite(error) ? smaller(error) : on_ladder(step_.length / (rung * rung));
       if (!std::isfinite(error)) relinearise(failures < 6 ? 1e-3 : 1e-9);
     }
     follow();
-    locate(crossed);
-    state_at(end_, y);
-    t = t_ + end_ * used_;
-    if (end_ == 1 && used_ == t_end - t_) t = t_end;
+    end_ = search_.first_crossing(step_, contact_, armed_, crossed);
+    if (end_ > 0)
+      state_at(end_, y);
+    else
+      y = start_;
+    t = step_.start + end_ * step_.length;
+    if (end_ == 1 && step_.length == t_end - step_.start) t = t_end;
     pending_ = true;
     reached_ = t;
     reached_state_ = y;
   }
 
-  void interpolate(double t, VectorXd& y) override { state_at((t - t_) / used_, y); }
+  void interpolate(double t, VectorXd& y) override { state_at((t - step_.start) / step_.length, y); }
 
   StepCounts counts() const override { return counts_; }
 
@@ -146,9 +153,9 @@ class ExponentialStepper final : public Stepper {
   /// Takes L where the step starts, unless it was taken near there (a part of p): that costs as much as some steps.
   void relinearise(double near) {
     const VectorXd p = start_.head(layout_.p);
-    if ((linear_->base - p).norm() <= near * std::max(linear_->base.norm(), p.norm())) return;
+    if ((step_.linear->base - p).norm() <= near * std::max(step_.linear->base.norm(), p.norm())) return;
     linear_parts_[contact_] = make_linear_part(p);
-    linear_ = linear_parts_[contact_].get();
+    step_.linear = linear_parts_[contact_].get();
     begin(start_);
     first_ = true;
   }
@@ -156,33 +163,32 @@ class ExponentialStepper final : public Stepper {
   double first_step() const {
     // A tenth of the period of the slowest vibration that is not overdamped; the error test takes it from there.
     double slowest = 0;
-    for (Index k = 0; k < linear_->lambda.size(); ++k) {
-      const double w = std::abs(linear_->lambda[k].imag());
+    for (Index k = 0; k < step_.linear->lambda.size(); ++k) {
+      const double w = std::abs(step_.linear->lambda[k].imag());
       if (w > 1e-3) slowest = slowest == 0 ? w : std::min(slowest, w);
     }
     return std::exp2(std::floor(std::log2(slowest > 0 ? 0.6 / slowest : 0.01)));
   }
 
   void begin(const VectorXd& y) {
-    const Index m = linear_->size();
+    const Index m = step_.linear->size();
     start_ = y;
-    Z_.resize(m, points);
+    step_.Z.resize(m, points);
     N_.resize(m, points);
     integral_.resize(m);
-    amplitude_.resize(linear_->lambda.size());
-    Z_.col(0).noalias() = linear_->to_modes * y.head(nx_);
-    X_.col(0) = y.head(nx_);
+    step_.Z.col(0).noalias() = step_.linear->to_modes * y.head(nx_);
+    step_.X.col(0) = y.head(nx_);
     evaluate(0);
-    linear_->remainder(F_.leftCols(1), Z_.leftCols(1), N_.leftCols(1));
+    step_.linear->remainder(F_.leftCols(1), step_.Z.leftCols(1), N_.leftCols(1));
   }
 
   /// The end of the last step is the start of the next.
   void advance_start() {
     pending_ = false;
-    t_ = reached_;
+    step_.start = reached_;
     start_ = reached_state_;
-    Z_.col(0) = Z_.col(degree).eval();
-    X_.col(0) = X_.col(degree).eval();
+    step_.Z.col(0) = step_.Z.col(degree).eval();
+    step_.X.col(0) = step_.X.col(degree).eval();
     N_.col(0) = N_.col(degree).eval();
     acceleration_.col(0) = acceleration_.col(degree).eval();
     power_[0] = power_[degree];
@@ -191,7 +197,7 @@ class ExponentialStepper final : public Stepper {
 
   /// F, hub acceleration and dissipated power at point j.
   void evaluate(int j) {
-    y_.head(nx_) = X_.col(j);
+    y_.head(nx_) = step_.X.col(j);
     system_.derivative(y_.data(), contact_, *work_, y_dot_.data());
     ++counts_.rhs_evaluations;
     F_.col(j) = y_dot_.head(nx_);
@@ -201,15 +207,17 @@ class ExponentialStepper final : public Stepper {
 
   /// Sweeps until the points stand still; returns the error in units of the one allowed, infinite when they do not.
   double solve(double left) {
-    const Index m = linear_->size();
+    const Index m = step_.linear->size();
     predict();
     double last_change = 0;
     for (int sweep = 0; sweep < max_sweeps; ++sweep) {
-      M_.noalias() = used_ * N_ * scaled_coefficients_;
-      for (int j = 1; j < points; ++j) linear_->combine(grid_->at[static_cast<size_t>(j)], 0, Z_.col(0), M_, Z_.col(j));
-      previous_ = X_.col(degree);
-      small_product(linear_->from_modes, Z_.rightCols(degree), X_.rightCols(degree));
-      const double change = sweep == 0 ? std::numeric_limits<double>::infinity() : norm(X_.col(degree) - previous_);
+      step_.M.noalias() = step_.length * N_ * scaled_coefficients_;
+      for (int j = 1; j < points; ++j)
+        step_.linear->combine(step_.grid->at[static_cast<size_t>(j)], 0, step_.Z.col(0), step_.M, step_.Z.col(j));
+      previous_ = step_.X.col(degree);
+      small_product(step_.linear->from_modes, step_.Z.rightCols(degree), step_.X.rightCols(degree));
+      const double change =
+          sweep == 0 ? std::numeric_limits<double>::infinity() : norm(step_.X.col(degree) - previous_);
       if (!std::isfinite(change) && sweep > 0) return change;
       if (sweep > 1 && change > last_change && change > 1) return std::numeric_limits<double>::infinity();
       const double ratio = sweep > 1 ? std::min(0.9, change / last_change) : contraction_;
@@ -218,23 +226,23 @@ class ExponentialStepper final : public Stepper {
       if (sweep + 1 == max_sweeps) return std::numeric_limits<double>::infinity();
       last_change = change;
       for (int j = 1; j < points; ++j) evaluate(j);
-      linear_->remainder(F_.rightCols(degree), Z_.rightCols(degree), N_.rightCols(degree));
+      step_.linear->remainder(F_.rightCols(degree), step_.Z.rightCols(degree), N_.rightCols(degree));
     }
     // What the middle point adds to the interpolation by the others.
     const Points& d = collocation::middle_difference();
     error_modes_.noalias() = N_ * d;
     zero_.setZero(m);
     z_error_.resize(m);
-    M_error_.noalias() = used_ * error_modes_ * middle_.transpose();
-    linear_->combine(grid_->at[degree], 0, zero_, M_error_, z_error_);
-    double error = norm(linear_->from_modes * z_error_);
-    const double weight = used_ * collocation::middle_polynomial().dot(collocation::integrals(1));
+    M_error_.noalias() = step_.length * error_modes_ * middle_.transpose();
+    step_.linear->combine(step_.grid->at[degree], 0, zero_, M_error_, z_error_);
+    double error = norm(step_.linear->from_modes * z_error_);
+    const double weight = step_.length * collocation::middle_polynomial().dot(collocation::integrals(1));
     const double lost = std::abs(power_.dot(d)) * weight;
     if (!system_.fixed_hub()) {
       // What the hub's rate keeps of the error turns it until the end.
-      const double turned = (linear_->drift_modes.lazyProduct(z_error_)).norm() * left;
+      const double turned = (step_.linear->drift_modes.lazyProduct(z_error_)).norm() * left;
       error = std::max(error, turned / (2 * scale_.tolerance * scale_.scale[layout_.attitude()]));
-      const Vector3d pushed = (acceleration_ - linear_->a_hub * X_) * d;  // and its speed carries it away
+      const Vector3d pushed = (acceleration_ - step_.linear->a_hub * step_.X) * d;  // and its speed carries it away
       error = std::max(error, pushed.norm() * weight * left / (scale_.tolerance * scale_.scale[layout_.position()]));
     }
     error = std::max(error, lost / (scale_.tolerance * scale_.scale[layout_.dissipated()]));
@@ -252,23 +260,23 @@ class ExponentialStepper final : public Stepper {
       return;
     }
     for (int j = 1; j < points; ++j) {
-      const double c = 1 + collocation::node(j) * used_ / last_used_;
+      const double c = 1 + collocation::node(j) * step_.length / last_used_;
       N_.col(j).noalias() = last_N_ * collocation::monomials(c);
     }
   }
 
   void choose_step(double error, bool last) {
     last_N_.noalias() = N_ * collocation::coefficients();
-    last_used_ = used_;
+    last_used_ = step_.length;
     if (last) return;
     const double growth = std::pow(std::max(error, 1e-10), -1.0 / (degree + 1));
-    if (growth > 1.25 * rung) h_ = used_ * (growth > 4 ? rung * rung : rung);
-    if (first_) linear_->step = used_;
+    if (growth > 1.25 * rung) h_ = on_ladder(step_.length * (growth > 4 ? rung * rung : rung));
+    if (first_) step_.linear->step = step_.length;
   }
   double smaller(double error) const {
-    double h = used_;
+    double h = step_.length;
     for (double left = error; left > 1; left /= std::pow(rung, degree + 1)) h /= rung;
-    return std::exp2(std::round(2 * std::log2(h)) / 2);
+    return on_ladder(h);
   }
 
   /// What follows p and u and does not act back: attitude, velocity, position, dissipated energy.
@@ -277,11 +285,11 @@ class ExponentialStepper final : public Stepper {
     power_coefficients_ = to_coefficients.transpose() * power_;
     if (system_.fixed_hub()) return;
     Eigen::Matrix<double, 3, points> omega, theta0, theta, C;
-    omega = X_.middleRows<3>(layout_.p);
+    omega = step_.X.middleRows<3>(layout_.p);
     theta0.col(0).setZero();
     for (int j = 1; j < points; ++j) {
-      linear_->combine(grid_->at[static_cast<size_t>(j)], 1, Z_.col(0), M_, integral_);
-      theta0.col(j).noalias() = used_ * (linear_->omega_modes.lazyProduct(integral_));
+      step_.linear->combine(step_.grid->at[static_cast<size_t>(j)], 1, step_.Z.col(0), step_.M, integral_);
+      theta0.col(j).noalias() = step_.length * (step_.linear->omega_modes.lazyProduct(integral_));
     }
     theta = theta0;
     for (int round = 0; round < 20; ++round) {
@@ -289,7 +297,7 @@ class ExponentialStepper final : public Stepper {
       C_.noalias() = C * to_coefficients;
       double change = 0;
       for (int j = 1; j < points; ++j) {
-        const Vector3d next = theta0.col(j) + used_ * (C_ * collocation::integrals(collocation::node(j)));
+        const Vector3d next = theta0.col(j) + step_.length * (C_ * collocation::integrals(collocation::node(j)));
         change = std::max(change, (next - theta.col(j)).norm());
         theta.col(j) = next;
       }
@@ -297,121 +305,34 @@ class ExponentialStepper final : public Stepper {
     }
     for (int j = 0; j < points; ++j) {
       const Eigen::Matrix3d A = rotation_matrix(quaternion_of(theta.col(j)));
-      G_values_.col(j) = A * acceleration_.col(j) - linear_->a_hub * X_.col(j);
+      G_values_.col(j) = A * acceleration_.col(j) - step_.linear->a_hub * step_.X.col(j);
     }
     G_.noalias() = G_values_ * to_coefficients;
   }
 
   /// The state at a fraction c of the step.
   void state_at(double c, VectorXd& y) {
-    const GridPoint* at = &grid_->at[degree];
-    if (c != 1) linear_->point(c, used_, scratch_), at = &scratch_;
+    const GridPoint* at = &step_.grid->at[degree];
+    if (c != 1) step_.linear->point(c, step_.length, scratch_), at = &scratch_;
     y.resize(layout_.size);
-    linear_->combine(*at, 0, Z_.col(0), M_, integral_);
-    small_product(linear_->from_modes, integral_, y.head(nx_));
-    y[layout_.dissipated()] = start_[layout_.dissipated()] + used_ * power_coefficients_.dot(collocation::integrals(c));
+    step_.linear->combine(*at, 0, step_.Z.col(0), step_.M, integral_);
+    small_product(step_.linear->from_modes, integral_, y.head(nx_));
+    y[layout_.dissipated()] =
+        start_[layout_.dissipated()] + step_.length * power_coefficients_.dot(collocation::integrals(c));
     if (system_.fixed_hub()) return;
     const auto I = collocation::integrals(c);
-    linear_->combine(*at, 1, Z_.col(0), M_, integral_);
-    const Vector3d theta = used_ * (linear_->omega_modes.lazyProduct(integral_) + C_ * I);
+    step_.linear->combine(*at, 1, step_.Z.col(0), step_.M, integral_);
+    const Vector3d theta = step_.length * (step_.linear->omega_modes.lazyProduct(integral_) + C_ * I);
     const Vector4d attitude = start_.segment<4>(layout_.attitude());
     const Eigen::Matrix3d A = rotation_matrix(attitude);
     y.segment<4>(layout_.attitude()) = quaternion_product(attitude, quaternion_of(theta));
-    const Vector3d dv = used_ * (linear_->a_hub_modes.lazyProduct(integral_) + G_ * I);
-    linear_->combine(*at, 2, Z_.col(0), M_, integral_);
-    const Vector3d dr =
-        used_ * used_ * (linear_->a_hub_modes.lazyProduct(integral_) + G_ * collocation::double_integrals(c));
+    const Vector3d dv = step_.length * (step_.linear->a_hub_modes.lazyProduct(integral_) + G_ * I);
+    step_.linear->combine(*at, 2, step_.Z.col(0), step_.M, integral_);
+    const Vector3d dr = step_.length * step_.length *
+                        (step_.linear->a_hub_modes.lazyProduct(integral_) + G_ * collocation::double_integrals(c));
     const Vector3d v0 = start_.segment<3>(layout_.velocity());
     y.segment<3>(layout_.velocity()) = v0 + A * dv;
-    y.segment<3>(layout_.position()) = start_.segment<3>(layout_.position()) + c * used_ * v0 + A * dr;
-  }
-
-  /// The value and its change per step at a fraction c.
-  Clearance clearance(int hinge, double c) {
-    linear_->point(c, used_, scratch_);
-    return clearance_at(hinge, c, scratch_);
-  }
-
-  Clearance clearance_at(int hinge, double c, const GridPoint& point) {
-    linear_->combine(point, 0, Z_.col(0), M_, integral_);
-    const int at = layout_.body[static_cast<size_t>(hinge)], rate = layout_.p + layout_.base + at;
-    const double side = contact_[static_cast<size_t>(hinge)] ? 1 : -1;
-    return {c, side * linear_->from_modes.row(at).dot(integral_),
-            side * used_ * linear_->from_modes.row(rate).dot(integral_)};
-  }
-
-  Clearance clearance_at_point(int hinge, int j) const {
-    const int at = layout_.body[static_cast<size_t>(hinge)], rate = layout_.p + layout_.base + at;
-    const double side = contact_[static_cast<size_t>(hinge)] ? 1 : -1;
-    return {collocation::node(j), side * X_(at, j), side * used_ * X_(rate, j)};
-  }
-
-  /// Ends the step at the first crossing of an armed stop.
-  void locate(std::span<int> crossed) {
-    roots_.clear();
-    end_ = 1;
-    for (int i = 0; i < static_cast<int>(armed_.size()); ++i) {
-      const double root = armed_[static_cast<size_t>(i)] ? first_crossing(i) : no_crossing;
-      if (root > 1) continue;
-      roots_.emplace_back(i, root);
-      end_ = std::min(end_, root);
-    }
-    const double same = (4e-16 * std::abs(t_) + 1e-14 * used_) / used_;  // booms that are alike cross together
-    for (const auto& [i, root] : roots_)
-      if (root <= end_ + same) crossed[static_cast<size_t>(i)] = contact_[static_cast<size_t>(i)] ? -1 : 1;
-  }
-
-  /// Vibration of a gap that the points of a step are too far apart for.
-  struct Ripple {
-    double turn = 0;       // angle that the fastest of it goes through in a step
-    double amplitude = 0;  // all of it, at the start
-  };
-
-  Ripple ripple(int hinge) {
-    const Index m = linear_->lambda.size();
-    const int at = layout_.body[static_cast<size_t>(hinge)];
-    const auto squared = [](double a, double b) { return a * a + b * b; };
-    double fastest = 0;
-    for (Index k = 0; k < m; ++k) {
-      amplitude_[k] = std::sqrt(squared(linear_->from_modes(at, k), linear_->from_modes(at, m + k)) *
-                                squared(Z_(k, 0), Z_(m + k, 0)));
-      fastest = std::max(fastest, std::norm(linear_->lambda[k]) * amplitude_[k] * amplitude_[k]);
-    }
-    Ripple r;
-    for (Index k = 0; k < m; ++k) {
-      const double turn = linear_->lambda[k].imag() * used_;
-      const double rate = std::norm(linear_->lambda[k]) * amplitude_[k] * amplitude_[k];
-      if (turn < 2 || rate < 4e-4 * fastest) continue;  // slow, or less than a fiftieth of the largest rate
-      r.turn = std::max(r.turn, turn);
-      r.amplitude += amplitude_[k];
-    }
-    return r;
-  }
-
-  /// The first fraction of the step where the gap leaves the side of its flag, or no_crossing.
-  double first_crossing(int i) {
-    const Ripple ripples = ripple(i);
-    const auto at = [&](double c) { return clearance(i, c); };
-    const double resolution = 4e-16 * std::max(1.0, std::abs(t_) / used_);
-    Clearance from = clearance_at_point(i, 0);
-    for (int j = 1; j < points; ++j) {
-      const Clearance to = clearance_at_point(i, j);
-      const bool clear = std::min(from.value, to.value) > 2 * ripples.amplitude;
-      const double turn = ripples.turn * (to.c - from.c);
-      const int level = clear || turn < 1 ? 0 : std::min(6, static_cast<int>(std::ceil(std::log2(turn))));
-      const std::vector<GridPoint>& between = linear_->between(*grid_, used_, j, level);
-      const int parts = 1 << level;
-      for (int part = 1; part <= parts; ++part) {
-        const Clearance next = part == parts ? to
-                                             : clearance_at(i, collocation::between(j, part, parts),
-                                                            between[static_cast<size_t>(part) - 1]);
-        const double root = crossing_between(at, from, next, resolution);
-        if (root <= 1) return root;
-        if (root == crossed_from_the_start) return no_crossing;
-        from = next;
-      }
-    }
-    return no_crossing;
+    y.segment<3>(layout_.position()) = start_.segment<3>(layout_.position()) + c * step_.length * v0 + A * dr;
   }
 
   const System& system_;
@@ -421,23 +342,22 @@ class ExponentialStepper final : public Stepper {
   int nx_;
   std::vector<char> contact_, armed_;
   std::map<std::vector<char>, std::unique_ptr<LinearPart>> linear_parts_;
-  LinearPart* linear_ = nullptr;
+  CollocatedStep step_;
+  StopSearch search_;
   Grid spare_;
-  Grid* grid_ = nullptr;
   GridPoint scratch_;
 
-  double t_ = 0, h_ = 0, used_ = 0, end_ = 1, last_used_ = 0, reached_ = 0, contraction_ = 0.1;
+  double h_ = 0, end_ = 1, last_used_ = 0, reached_ = 0, contraction_ = 0.1;
   bool first_ = true, pending_ = false;
   VectorXd start_, reached_state_;
   VectorXd y_, y_dot_, previous_;
-  MatrixXd F_, X_, Z_, N_, M_, last_N_, M_error_;
-  VectorXd error_modes_, z_error_, zero_, integral_, amplitude_;
+  MatrixXd F_, N_, last_N_, M_error_;
+  VectorXd error_modes_, z_error_, zero_, integral_;
   Points power_ = Points::Zero(), power_coefficients_ = Points::Zero();
   Points middle_ = Points::Zero();
   collocation::Table scaled_coefficients_;
   Matrix3Points G_ = Matrix3Points::Zero(), C_ = Matrix3Points::Zero(), G_values_ = Matrix3Points::Zero(),
                 acceleration_ = Matrix3Points::Zero();
-  std::vector<std::pair<int, double>> roots_;
   StepCounts counts_;
 };
 

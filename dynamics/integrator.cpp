@@ -184,6 +184,8 @@ class Flight {
         contacts_(contacts_at_start(system, y0)),
         y_(y0),
         sample_(y0),
+        y_dot_(y0.size()),
+        work_(system.workspace()),
         crossed_(contacts_.closed.size(), 0) {}
 
   Trajectory fly() {
@@ -268,7 +270,7 @@ class Flight {
         contacts_.closed[i] = contact;
         result_.events.push_back({t_, hinge, contact, rate});
         changed = true;
-        if (std::abs(rate) < settle_ * largest) settle(i);
+        if (std::abs(rate) < settle_ * largest && !pushed(i)) settle(i);
       } else if (contacts_.settled_since[i] >= 0 && std::abs(rate) > 2 * settle_ * largest) {
         wake(i);
         changed = true;
@@ -284,6 +286,16 @@ class Flight {
     const double gap = system_.gap(y_.data(), static_cast<int>(i));
     const double noise = scales_.error().tolerance * scales_.error().scale[system_.layout().body[i]];
     return contacts_.closed[i] ? gap < -noise : gap > noise;
+  }
+
+  /// Does something push a hinge that is on its stop, so that it will not stay there? A boom that is pressed against
+  /// its stop swings in it, and comes back to where the stop begins with no rate left.
+  bool pushed(size_t i) {
+    system_.derivative(y_.data(), contacts_.closed, *work_, y_dot_.data());
+    const Appendage& a = system_.appendages()[i];
+    const double period = std::sqrt(a.body.J0(2, 2) / (a.hinge.mechanism.stiffness + a.hinge.mechanism.stop_stiffness));
+    const double push = system_.gap_rate(y_dot_.data(), static_cast<int>(i));
+    return std::abs(push) * period > 2 * settle_ * contacts_.largest_rate[i];
   }
 
   void settle(size_t i) {
@@ -339,7 +351,8 @@ class Flight {
   std::unique_ptr<Stepper> stepper_;
   Contacts contacts_;
   double t_ = 0;
-  VectorXd y_, sample_;
+  VectorXd y_, sample_, y_dot_;
+  WorkspaceHandle work_;
   std::vector<int> crossed_;
   long steps_ = 0;
   Trajectory result_;
