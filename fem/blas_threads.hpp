@@ -26,6 +26,19 @@ class WithoutOpenMP {
   int levels_;
 };
 
+/// While one lives, dense kernels run on the thread that calls them. Several threads that call them at once wait for
+/// each other's helpers by spinning: ten times slower. Made outside the threads.
+class OneBlasThread {
+ public:
+  OneBlasThread();
+  ~OneBlasThread();
+  OneBlasThread(const OneBlasThread&) = delete;
+  OneBlasThread& operator=(const OneBlasThread&) = delete;
+
+ private:
+  int threads_;
+};
+
 /// The BLAS in use and its kernels, "OpenBLAS 0.3.21, SkylakeX kernels"; "unknown" for another than OpenBLAS.
 std::string blas_release();
 

@@ -1,16 +1,19 @@
 #pragma once
 
+#include "fem/blas_threads.hpp"
+
 #include <algorithm>
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <vector>
 
 namespace flexboom {
 
 /// Calls body(i) for i in [0, count) on `threads` threads in blocks of `grain`. The first exception is thrown again
-/// here.
+/// here. Dense kernels run on the thread that calls them meanwhile.
 template <class Body>
 void parallel_for(int threads, int count, int grain, const Body& body) {
   std::atomic<int> next = 0;
@@ -29,6 +32,8 @@ void parallel_for(int threads, int count, int grain, const Body& body) {
     }
   };
   const int wanted = std::min(threads, (count + grain - 1) / grain);
+  std::optional<OneBlasThread> alone;
+  if (wanted > 1) alone.emplace();
   std::vector<std::jthread> helpers;
   for (int t = 1; t < wanted; ++t) helpers.emplace_back(work);
   work();
