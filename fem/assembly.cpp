@@ -208,7 +208,7 @@ VectorXd strain_energies(const Mesh& mesh, const DofMap& dofs, const Eigen::Ref<
     for (int e = b * block; e < std::min(elements, (b + 1) * block); ++e) {
       const Element& element = element_of(mesh, e);
       const MatrixXd q = U(dofs.of_element(mesh, e), Eigen::all);
-      strain.col(b) += type_of(element).strain_energy(mesh, element, q);
+      strain.col(b) += type_of(element).energy_strains(mesh, element, q).rowwise().squaredNorm() / 2;
     }
   });
   return strain.rowwise().sum();

@@ -292,6 +292,16 @@ void strain_points(const Mesh& mesh, const Element& element, const StrainPointVi
   }
 }
 
+MatrixXd energy_strains(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
+  MatrixXd strains(q.cols(), 0);
+  strain_points(mesh, element, [&](double weight, const MatrixXd& B, const MatrixXd& D) {
+    const VectorXd root = (weight * D.diagonal()).cwiseSqrt();  // D is diagonal
+    strains.conservativeResize(Eigen::NoChange, strains.cols() + B.rows());
+    strains.rightCols(B.rows()) = (root.asDiagonal() * (B * q)).transpose();
+  });
+  return strains;
+}
+
 void mass_points(const Mesh& mesh, const Element& element, int extra, const MassPointVisitor& visit) {
   const BeamProperty& property = property_of(mesh, element);
   const Frame frame = frame_of(mesh, element);
@@ -317,12 +327,11 @@ void mass_points(const Mesh& mesh, const Element& element, int extra, const Mass
   }
 }
 
-MatrixXd prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
-                        const Eigen::Ref<const MatrixXd>& q) {
+void add_prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
+                        const Eigen::Ref<const MatrixXd>& q, Eigen::Ref<MatrixXd> work) {
   const BeamProperty& property = property_of(mesh, element);
   const bool with_shear = has_shear(property);
   const Frame frame = frame_of(mesh, element);
-  MatrixXd work = MatrixXd::Zero(q.cols() * (q.cols() + 1) / 2, q0.cols());
   const auto resultants_at = [&](double xi, const Section& section) {
     return resultants(property, section, slopes_at(frame, element.order, with_shear, xi, q0).strain);
   };
@@ -335,12 +344,11 @@ MatrixXd prestress_work(const Mesh& mesh, const Element& element, const Eigen::R
     if (!with_shear) add_shear_forces_inside(slopes, pairs);
     work.noalias() += rule.weights(g) * frame.length / 2 * (pairs * resultants_at(xi, section));
   }
-  if (with_shear) return work;
+  if (with_shear) return;
   for (const double end : {-1.0, 1.0}) {
     const Slopes slopes = slopes_at(frame, element.order, with_shear, end, q);
     work.noalias() += end * (shear_forces_at_end(slopes) * resultants_at(end, section_at(property, (1 + end) / 2)));
   }
-  return work;
 }
 
 Matrix6X interpolation(const Mesh& mesh, const Element& element, const Vector3d& at) {

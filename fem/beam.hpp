@@ -13,13 +13,16 @@ int internal_freedoms(const Mesh&, const Element&);
 /// about y, z [1/m].
 void strain_points(const Mesh&, const Element&, const StrainPointVisitor&);
 
+/// As ElementType has it.
+Eigen::MatrixXd energy_strains(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
+
 /// Four points in every section that carry its A, Iy, Iz exactly, or one on the axis without rotary inertia.
 void mass_points(const Mesh&, const Element&, int extra, const MassPointVisitor&);
 
 /// Kg of the stress resultants of q0 (README): N (v'^2 + w'^2 + Ip/A twist^2), - M . (theta x theta'), and shear forces
 /// with torsion. Terms that change Ke by a factor of the order of the prestrain are left out.
-Eigen::MatrixXd prestress_work(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
-                               const Eigen::Ref<const Eigen::MatrixXd>& q);
+void add_prestress_work(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
+                        const Eigen::Ref<const Eigen::MatrixXd>& q, Eigen::Ref<Eigen::MatrixXd> work);
 
 /// Displacement [m] and rotation [rad] rows in mesh axes at (s, -, -), s in [0, 1].
 Eigen::Matrix<double, 6, Eigen::Dynamic> interpolation(const Mesh&, const Element&, const Eigen::Vector3d& at);

@@ -8,6 +8,8 @@
 extern "C" void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
                        const double* alpha, const double* a, const int* lda, const double* b, const int* ldb,
                        const double* beta, double* c, const int* ldc);
+extern "C" void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha,
+                       const double* a, const int* lda, const double* beta, double* c, const int* ldc);
 
 namespace flexboom {
 
@@ -27,6 +29,16 @@ void add_product(Ref<MatrixXd> Y, double factor, Transposed transposed, const Re
              ldy = static_cast<int>(Y.outerStride());
   const double one = 1;
   dgemm_(turned ? "T" : "N", "N", &m, &n, &k, &factor, A.data(), &lda, X.data(), &ldx, &one, Y.data(), &ldy);
+}
+
+void add_gram(Ref<MatrixXd> Y, const Ref<const MatrixXd>& A) {
+  require(Y.rows() == A.rows() && Y.cols() == A.rows(),
+          fmt::format("Gram matrix: {} x {} of {} rows", Y.rows(), Y.cols(), A.rows()));
+  if (A.size() == 0) return;
+  const auto n = static_cast<int>(A.rows()), k = static_cast<int>(A.cols());
+  const auto lda = static_cast<int>(A.outerStride()), ldy = static_cast<int>(Y.outerStride());
+  const double one = 1;
+  dsyrk_("L", "N", &n, &k, &one, A.data(), &lda, &one, Y.data(), &ldy);
 }
 
 MatrixXd transposed_product(const Ref<const MatrixXd>& A, const Ref<const MatrixXd>& X) {

@@ -11,6 +11,9 @@ enum class Transposed { no, yes };
 void add_product(Eigen::Ref<Eigen::MatrixXd> Y, double factor, Transposed, const Eigen::Ref<const Eigen::MatrixXd>& A,
                  const Eigen::Ref<const Eigen::MatrixXd>& X);
 
+/// Adds A A^T to the lower triangle of Y, by the BLAS.
+void add_gram(Eigen::Ref<Eigen::MatrixXd> Y, const Eigen::Ref<const Eigen::MatrixXd>& A);
+
 /// A^T X by the BLAS.
 Eigen::MatrixXd transposed_product(const Eigen::Ref<const Eigen::MatrixXd>& A,
                                    const Eigen::Ref<const Eigen::MatrixXd>& X);

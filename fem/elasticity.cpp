@@ -1,12 +1,9 @@
 #include "fem/elasticity.hpp"
 
 #include "fem/check.hpp"
-#include "fem/dense.hpp"
-#include "fem/lanes.hpp"
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <string>
 
 namespace flexboom::elasticity {
@@ -54,66 +51,6 @@ Matrix6X motion_rows(const Eigen::Ref<const Eigen::VectorXd>& values,
     rows.block<3, 3>(3, 3 * a) << 0, -z, y, z, 0, -x, -y, x, 0;
   }
   return rows;
-}
-
-namespace {
-
-// Second-order strains xx yy zz xy yz zx (engineering shear) of all pairs of vectors: entry `pair` of component c at
-// strains[c * pairs + pair]. Slopes: count x 9, column 3 i + m holds the slope of component m along x_i.
-FLEXBOOM_FOR_EACH_PROCESSOR void set_second_order(const double* slopes, int count, int pairs, double* strains) {
-  for (int k = 0, first = 0; k < count; first += count - k, ++k) {
-    double of_k[9];
-    for (int i = 0; i < 9; ++i) of_k[i] = slopes[i * count + k];
-    const double* const of_l = slopes + k;
-    double* const to = strains + first;
-    const auto slope = [of_l, count](int i, int l) { return of_l[i * count + l]; };
-    const auto work = [&](int i, int j, int l) {
-      return of_k[3 * i] * slope(3 * j, l) + of_k[3 * i + 1] * slope(3 * j + 1, l) +
-             of_k[3 * i + 2] * slope(3 * j + 2, l);
-    };
-#pragma GCC ivdep
-    for (int l = 0; l < count - k; ++l) {
-      to[l] = work(0, 0, l);
-      to[pairs + l] = work(1, 1, l);
-      to[2 * pairs + l] = work(2, 2, l);
-      to[3 * pairs + l] = work(0, 1, l) + work(1, 0, l);
-      to[4 * pairs + l] = work(1, 2, l) + work(2, 1, l);
-      to[5 * pairs + l] = work(2, 0, l) + work(0, 2, l);
-    }
-  }
-}
-
-Eigen::Matrix<double, 6, 1> stress(const Eigen::Matrix3d& gradient, const Lame& m) {
-  const Eigen::Matrix3d strain = gradient + gradient.transpose();
-  Eigen::Matrix<double, 6, 1> s;
-  s.head<3>() = m.mu * strain.diagonal().array() + m.lambda * gradient.trace();
-  s.tail<3>() = m.mu * Eigen::Vector3d(strain(0, 1), strain(1, 2), strain(2, 0));
-  return s;
-}
-
-}  // namespace
-
-MatrixXd prestress_work(const Eigen::VectorXd& volumes, const MatrixXd& gradients, Index modes, const Lame& lame) {
-  const Index loads = gradients.cols() / 3 - modes, pairs = modes * (modes + 1) / 2, points = volumes.size();
-  const Index block = std::max<Index>(1, 98304 / (6 * pairs + 1));  // points whose pairs are held at a time: 0.8 MB
-  MatrixXd work = MatrixXd::Zero(pairs, loads);
-  MatrixXd strains(pairs, 6 * std::min(block, points)), stresses(6 * std::min(block, points), loads);
-  Eigen::Matrix<double, Eigen::Dynamic, 9> slopes(modes, 9);
-  for (Index first = 0; first < points; first += block) {
-    const Index count = std::min(block, points - first);
-    for (Index p = 0; p < count; ++p) {
-      const auto rows = gradients.middleRows<3>(3 * (first + p));
-      for (Index k = 0; k < modes; ++k) {
-        for (Index i = 0; i < 3; ++i) slopes.block<1, 3>(k, 3 * i) = rows.block<1, 3>(i, 3 * k);
-      }
-      set_second_order(slopes.data(), static_cast<int>(modes), static_cast<int>(pairs), strains.col(6 * p).data());
-      for (Index c = 0; c < loads; ++c) {
-        stresses.block<6, 1>(6 * p, c) = volumes(first + p) * stress(rows.block<3, 3>(0, 3 * (modes + c)), lame);
-      }
-    }
-    add_product(work, 1, Transposed::no, strains.leftCols(6 * count), stresses.topRows(6 * count));
-  }
-  return work;
 }
 
 MatrixXd stiffness_from_gradients(const MatrixXd& H, const Lame& m) {

@@ -31,21 +31,6 @@ Eigen::MatrixXd elasticity_matrix(const Lame&);
 Matrix6X motion_rows(const Eigen::Ref<const Eigen::VectorXd>& values,
                      const Eigen::Ref<const Eigen::MatrixX3d>& gradients);
 
-/// Strain energy per volume of a displacement gradient [J/m^3].
-inline double energy_density(const Eigen::Matrix3d& gradient, const Lame& m) {
-  const double trace = gradient.trace();
-  const double shear_xy = gradient(0, 1) + gradient(1, 0), shear_yz = gradient(1, 2) + gradient(2, 1),
-               shear_zx = gradient(2, 0) + gradient(0, 2);
-  return m.lambda / 2 * trace * trace + m.mu * gradient.diagonal().squaredNorm() +
-         m.mu / 2 * (shear_xy * shear_xy + shear_yz * shear_yz + shear_zx * shear_zx);
-}
-
-/// Prestress work (ElementType::prestress_work) of points of a volume. Rows 3 p + i of `gradients` belong to point p,
-/// column 3 c + m holds the slope of component m along x_i of vector c: the `modes` first, then the prestresses.
-/// Cauchy's stress of the prestress times Green's second-order strain: volume sigma_ij (du_k/dx_i . du_l/dx_j).
-Eigen::MatrixXd prestress_work(const Eigen::VectorXd& volumes, const Eigen::MatrixXd& gradients, Eigen::Index modes,
-                               const Lame&);
-
 /// Lower triangle of K over 3 n freedoms from the lower triangle of the sums H = sum w g g^T of gradients g stacked by
 /// component (3 n x 3 n): K_ab = lambda g_a g_b^T + mu g_b g_a^T + mu (g_a . g_b) I.
 Eigen::MatrixXd stiffness_from_gradients(const Eigen::MatrixXd& H, const Lame&);

@@ -48,16 +48,6 @@ MatrixXd mass_from_points(const Mesh& mesh, const Element& element) {
   return M;
 }
 
-template <void (*strain_points)(const Mesh&, const Element&, const StrainPointVisitor&)>
-VectorXd energy_from_points(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
-  VectorXd energy = VectorXd::Zero(q.cols());
-  strain_points(mesh, element, [&](double weight, const MatrixXd& B, const MatrixXd& D) {
-    const MatrixXd strain = B * q;
-    energy += weight / 2 * strain.cwiseProduct(D * strain).colwise().sum().transpose();
-  });
-  return energy;
-}
-
 template <int count>
 int fixed_count(int) {
   return count;
@@ -83,8 +73,8 @@ constexpr ElementType beam_row(std::string_view name) {
           beam::strain_points,
           beam::interpolation,
           beam::position,
-          energy_from_points<beam::strain_points>,
-          beam::prestress_work,
+          beam::energy_strains,
+          beam::add_prestress_work,
           beam::validate};
 }
 
@@ -103,8 +93,8 @@ constexpr ElementType solid_row(std::string_view name, Shape shape, int (*node_c
           Strains::strain_points,
           Type::interpolation,
           Type::position,
-          Strains::strain_energy,
-          Strains::prestress_work,
+          Strains::energy_strains,
+          Strains::add_prestress_work,
           Type::validate};
 }
 

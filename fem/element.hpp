@@ -41,13 +41,14 @@ struct ElementType {
   Eigen::Matrix<double, 6, Eigen::Dynamic> (*interpolation)(const Mesh&, const Element&, const Eigen::Vector3d&);
   /// Undeformed position of a point of the reference element.
   Eigen::Vector3d (*position)(const Mesh&, const Element&, const Eigen::Vector3d&);
-  /// Strain energy [J] = 1/2 q^T K q of each column of q (freedoms x k), summed over strain points.
-  Eigen::VectorXd (*strain_energy)(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
-  /// Second-order work of prestress [N m]: of each static displacement q0 (freedoms x loads) and each pair of columns
-  /// of q (freedoms x k), the integral of the stress of q0 times the second-order strain of the pair. Rows are the
-  /// lower triangle of the k x k matrix column by column, columns the loads: k (k + 1) / 2 x loads.
-  Eigen::MatrixXd (*prestress_work)(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
-                                    const Eigen::Ref<const Eigen::MatrixXd>& q);
+  /// Strains at all strain points of each column of q (freedoms x k), scaled such that q_i^T K q_j [J] is the product
+  /// of the rows i and j: k x strains.
+  Eigen::MatrixXd (*energy_strains)(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
+  /// Adds the second-order work of prestress [N m]: of each static displacement q0 (freedoms x loads) and each pair of
+  /// columns of q (freedoms x k), the integral of the stress of q0 times the second-order strain of the pair. Rows are
+  /// the lower triangle of the k x k matrix column by column, columns the loads: k (k + 1) / 2 x loads.
+  void (*add_prestress_work)(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
+                             const Eigen::Ref<const Eigen::MatrixXd>& q, Eigen::Ref<Eigen::MatrixXd> work);
   /// @throws InputError on what makes the element impossible (zero length, inverted, property missing or in conflict).
   void (*validate)(const Mesh&, const Element&);
 };

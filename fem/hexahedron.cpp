@@ -1,6 +1,8 @@
 #include "fem/hexahedron.hpp"
 
 #include "fem/check.hpp"
+#include "fem/dense.hpp"
+#include "fem/elastic_fields.hpp"
 #include "fem/elasticity.hpp"
 #include "fem/shape_functions.hpp"
 
@@ -92,7 +94,7 @@ const OrderTables& order_tables(int order) {
 // Contracts the first index with A (m x n) and moves it to the end: [a, rest] -> [rest, q].
 MatrixXd contract_first(const MatrixXd& A, const MatrixXd& X) {
   const Index n = A.cols(), rest = X.size() / n;
-  return Map<const MatrixXd>(X.data(), n, rest).transpose() * A.transpose();
+  return transposed_product(Map<const MatrixXd>(X.data(), n, rest), A.transpose());
 }
 
 // Values (direction < 0) or slopes along `direction` of k fields (n^3 x k) at all points: k x m^3.
@@ -213,13 +215,12 @@ Vector3d point_of(const GaussRule& rule, Index q) {
   return {rule.points(q % m), rule.points(q / m % m), rule.points(q / (m * m))};
 }
 
-// Components of the vectors q (freedoms x k) less those of the first node: n^3 x 3 k, column 3 k + i.
-MatrixXd fields_of(const Eigen::Ref<const MatrixXd>& q) {
-  MatrixXd fields(q.rows() / 3, 3 * q.cols());
-  for (Index k = 0; k < q.cols(); ++k) {
-    for (Index i = 0; i < 3; ++i) {
-      for (Index a = 0; a < fields.rows(); ++a) fields(a, 3 * k + i) = q(3 * a + i, k) - q(i, k);
-    }
+// Slopes of vectors q (freedoms x k) at the points of a line table, direction by direction.
+elasticity::FieldSlopes field_slopes(const LineTable& line, const Metric& at, const Eigen::Ref<const MatrixXd>& q) {
+  const std::array<MatrixXd, 3> slopes = slopes_at_points(line, elasticity::fields_of(q));
+  elasticity::FieldSlopes fields(q.cols(), at.volumes.size());
+  for (Index p = 0; p < at.volumes.size(); ++p) {
+    fields.set(p, at.volumes(p), at.G[static_cast<size_t>(p)], {&slopes[0](0, p), &slopes[1](0, p), &slopes[2](0, p)});
   }
   return fields;
 }
@@ -305,39 +306,19 @@ Vector3d Hexahedron::position(const Mesh& mesh, const Element& element, const Ve
   return first + elasticity::local_positions(mesh, element).transpose() * shapes_at(element.order, at).values;
 }
 
-VectorXd Hexahedron::strain_energy(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
+MatrixXd Hexahedron::energy_strains(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
   const LineTable& line = order_tables(element.order).stiffness;
   const Metric at = metric(line, elasticity::local_positions(mesh, element));
-  const Lame lame = elasticity::lame(elasticity::material_of(mesh, element));
-  const std::array<MatrixXd, 3> slopes = slopes_at_points(line, fields_of(q));
-  VectorXd energy = VectorXd::Zero(q.cols());
-  for (Index p = 0; p < at.volumes.size(); ++p) {
-    for (Index k = 0; k < q.cols(); ++k) {
-      Matrix3d by_reference;
-      for (Index r = 0; r < 3; ++r) by_reference.col(r) = slopes[static_cast<size_t>(r)].col(p).segment<3>(3 * k);
-      const Matrix3d gradient = by_reference * at.G[static_cast<size_t>(p)];
-      energy(k) += at.volumes(p) * elasticity::energy_density(gradient, lame);
-    }
-  }
-  return energy;
+  return elasticity::energy_strains(field_slopes(line, at, q),
+                                    elasticity::lame(elasticity::material_of(mesh, element)));
 }
 
-MatrixXd Hexahedron::prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
-                                    const Eigen::Ref<const MatrixXd>& q) {
+void Hexahedron::add_prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
+                                    const Eigen::Ref<const MatrixXd>& q, Eigen::Ref<MatrixXd> work) {
   const LineTable& line = order_tables(element.order).prestress;
   const Metric at = metric(line, elasticity::local_positions(mesh, element));
-  MatrixXd fields(q.rows() / 3, 3 * (q.cols() + q0.cols()));
-  fields << fields_of(q), fields_of(q0);
-  const std::array<MatrixXd, 3> slopes = slopes_at_points(line, fields);
-  MatrixXd gradients(3 * at.volumes.size(), fields.cols());
-  for (Index p = 0; p < at.volumes.size(); ++p) {
-    const Matrix3d& G = at.G[static_cast<size_t>(p)];
-    for (Index i = 0; i < 3; ++i) {
-      gradients.row(3 * p + i) = G(0, i) * slopes[0].col(p) + G(1, i) * slopes[1].col(p) + G(2, i) * slopes[2].col(p);
-    }
-  }
-  return elasticity::prestress_work(at.volumes, gradients, q.cols(),
-                                    elasticity::lame(elasticity::material_of(mesh, element)));
+  elasticity::add_prestress_work(field_slopes(line, at, q0), field_slopes(line, at, q),
+                                 elasticity::lame(elasticity::material_of(mesh, element)), work);
 }
 
 void Hexahedron::validate(const Mesh& mesh, const Element& element) {

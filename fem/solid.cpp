@@ -1,5 +1,7 @@
 #include "fem/solid.hpp"
 
+#include "fem/dense.hpp"
+#include "fem/elastic_fields.hpp"
 #include "fem/elasticity.hpp"
 #include "fem/shape_functions.hpp"
 
@@ -190,48 +192,18 @@ MatrixXd mass_of(const Table& table, const Mesh& mesh, const Element& element) {
   return elasticity::mass_from_scalar(m);
 }
 
-// Column 3 k + i: component i of vector k, less its value at the first node, which strains nothing.
-MatrixXd fields_of(const Eigen::Ref<const MatrixXd>& q) {
-  MatrixXd U(q.rows() / 3, 3 * q.cols());
-  for (Index k = 0; k < q.cols(); ++k) {
-    for (Index a = 0; a < U.rows(); ++a) {
-      U.block<1, 3>(a, 3 * k) = (q.col(k).segment<3>(3 * a) - q.col(k).head<3>()).transpose();
-    }
-  }
-  return U;
-}
-
-VectorXd energy_of(const Table& table, const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
-  const MatrixX3d X = elasticity::local_positions(mesh, element);
-  const Lame lame = elasticity::lame(elasticity::material_of(mesh, element));
-  const MatrixX3d J = jacobians(table, X);
-  const MatrixXd R = table.rows * fields_of(q);
-  VectorXd energy = VectorXd::Zero(q.cols());
-  for (Index p = 0; p < table.weights.size(); ++p) {
-    const Matrix3d Jt = J.middleRows<3>(3 * p), inverse = Jt.inverse();
-    const double volume = table.weights(p) * Jt.determinant();
-    for (Index k = 0; k < q.cols(); ++k) {
-      const Matrix3d gradient = inverse * R.block<3, 3>(3 * p, 3 * k);
-      energy(k) += volume * elasticity::energy_density(gradient, lame);
-    }
-  }
-  return energy;
-}
-
-MatrixXd prestress_work_of(const Table& table, const Mesh& mesh, const Element& element,
-                           const Eigen::Ref<const MatrixXd>& q0, const Eigen::Ref<const MatrixXd>& q) {
+elasticity::FieldSlopes field_slopes(const Table& table, const Mesh& mesh, const Element& element,
+                                     const Eigen::Ref<const MatrixXd>& q) {
   const MatrixX3d J = jacobians(table, elasticity::local_positions(mesh, element));
-  MatrixXd U(q.rows() / 3, 3 * (q.cols() + q0.cols()));
-  U << fields_of(q), fields_of(q0);
-  MatrixXd gradients = table.rows * U;
-  VectorXd volumes(table.weights.size());
-  for (Index p = 0; p < volumes.size(); ++p) {
+  const MatrixXd slopes = transposed_product(elasticity::fields_of(q), table.slopes);
+  elasticity::FieldSlopes fields(q.cols(), table.weights.size());
+  for (Index p = 0; p < table.weights.size(); ++p) {
     const Matrix3d Jt = J.middleRows<3>(3 * p);
-    volumes(p) = table.weights(p) * Jt.determinant();
-    gradients.middleRows<3>(3 * p) = (Jt.inverse() * gradients.middleRows<3>(3 * p)).eval();
+    const double* const at = &slopes(0, 3 * p);
+    fields.set(p, table.weights(p) * Jt.determinant(), Jt.inverse().transpose(),
+               {at, at + slopes.rows(), at + 2 * slopes.rows()});
   }
-  return elasticity::prestress_work(volumes, gradients, q.cols(),
-                                    elasticity::lame(elasticity::material_of(mesh, element)));
+  return fields;
 }
 
 void visit_masses(const Table& table, const Mesh& mesh, const Element& element, const MassPointVisitor& visit) {
@@ -305,14 +277,17 @@ Vector3d Solid<kind>::position(const Mesh& mesh, const Element& element, const V
 }
 
 template <SolidKind kind>
-VectorXd Solid<kind>::strain_energy(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
-  return energy_of(stiffness_table<kind>(), mesh, element, q);
+MatrixXd Solid<kind>::energy_strains(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
+  return elasticity::energy_strains(field_slopes(stiffness_table<kind>(), mesh, element, q),
+                                    elasticity::lame(elasticity::material_of(mesh, element)));
 }
 
 template <SolidKind kind>
-MatrixXd Solid<kind>::prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
-                                     const Eigen::Ref<const MatrixXd>& q) {
-  return prestress_work_of(prestress_table<kind>(), mesh, element, q0, q);
+void Solid<kind>::add_prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
+                                     const Eigen::Ref<const MatrixXd>& q, Eigen::Ref<MatrixXd> work) {
+  const Table& table = prestress_table<kind>();
+  elasticity::add_prestress_work(field_slopes(table, mesh, element, q0), field_slopes(table, mesh, element, q),
+                                 elasticity::lame(elasticity::material_of(mesh, element)), work);
 }
 
 template <SolidKind kind>

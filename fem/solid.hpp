@@ -17,9 +17,9 @@ struct Solid {
   static void strain_points(const Mesh&, const Element&, const StrainPointVisitor&);
   static Eigen::Matrix<double, 6, Eigen::Dynamic> interpolation(const Mesh&, const Element&, const Eigen::Vector3d&);
   static Eigen::Vector3d position(const Mesh&, const Element&, const Eigen::Vector3d&);
-  static Eigen::VectorXd strain_energy(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
-  static Eigen::MatrixXd prestress_work(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
-                                        const Eigen::Ref<const Eigen::MatrixXd>& q);
+  static Eigen::MatrixXd energy_strains(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
+  static void add_prestress_work(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
+                                 const Eigen::Ref<const Eigen::MatrixXd>& q, Eigen::Ref<Eigen::MatrixXd> work);
   /// @throws InputError unless the Jacobian is positive at all strain points and nodes.
   static void validate(const Mesh&, const Element&);
 };

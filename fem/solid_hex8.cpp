@@ -1,5 +1,6 @@
 #include "fem/solid_hex8.hpp"
 
+#include "fem/elastic_fields.hpp"
 #include "fem/elasticity.hpp"
 #include "fem/shape_functions.hpp"
 
@@ -160,6 +161,17 @@ Matrix3d gradient_at(const Point& point, const Motion& motion) {
   return gradient;
 }
 
+elasticity::FieldSlopes field_slopes(const Points& points, const Amplitudes& A, const Eigen::Ref<const MatrixXd>& q) {
+  elasticity::FieldSlopes fields(q.cols(), std::ssize(points));
+  for (size_t p = 0; p < points.size(); ++p) fields.volumes(static_cast<Index>(p)) = points[p].volume;
+  for (Index k = 0; k < q.cols(); ++k) {
+    const Motion motion = motion_of(q.col(k), A);
+    for (size_t p = 0; p < points.size(); ++p)
+      fields.slopes.block<1, 9>(k, 9 * static_cast<Index>(p)) = gradient_at(points[p], motion).reshaped().transpose();
+  }
+  return fields;
+}
+
 Lame lame_of(const Mesh& mesh, const Element& element) {
   return elasticity::lame(elasticity::material_of(mesh, element));
 }
@@ -189,36 +201,19 @@ void Hex8<strain>::strain_points(const Mesh& mesh, const Element& element, const
 }
 
 template <Hex8Strain strain>
-VectorXd Hex8<strain>::strain_energy(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
+MatrixXd Hex8<strain>::energy_strains(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q) {
   const Points points = points_of<strain>(mesh, element);
   const Lame lame = lame_of(mesh, element);
-  const Amplitudes A = amplitudes(complete_stiffness(points, lame));
-  VectorXd energy = VectorXd::Zero(q.cols());
-  for (Index k = 0; k < q.cols(); ++k) {
-    const Motion motion = motion_of(q.col(k), A);
-    for (const Point& point : points) {
-      energy(k) += point.volume * elasticity::energy_density(gradient_at(point, motion), lame);
-    }
-  }
-  return energy;
+  return elasticity::energy_strains(field_slopes(points, amplitudes(complete_stiffness(points, lame)), q), lame);
 }
 
 template <Hex8Strain strain>
-MatrixXd Hex8<strain>::prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
-                                      const Eigen::Ref<const MatrixXd>& q) {
+void Hex8<strain>::add_prestress_work(const Mesh& mesh, const Element& element, const Eigen::Ref<const MatrixXd>& q0,
+                                      const Eigen::Ref<const MatrixXd>& q, Eigen::Ref<MatrixXd> work) {
   const Points points = points_of<strain>(mesh, element);
   const Lame lame = lame_of(mesh, element);
   const Amplitudes A = amplitudes(complete_stiffness(points, lame));
-  VectorXd volumes(8);
-  MatrixXd gradients(24, 3 * (q.cols() + q0.cols()));
-  for (Index k = 0; k < q.cols() + q0.cols(); ++k) {
-    const Motion motion = motion_of(k < q.cols() ? q.col(k) : q0.col(k - q.cols()), A);
-    for (Index p = 0; p < 8; ++p) {
-      gradients.block<3, 3>(3 * p, 3 * k) = gradient_at(points[static_cast<size_t>(p)], motion).transpose();
-    }
-  }
-  for (Index p = 0; p < 8; ++p) volumes(p) = points[static_cast<size_t>(p)].volume;
-  return elasticity::prestress_work(volumes, gradients, q.cols(), lame);
+  elasticity::add_prestress_work(field_slopes(points, A, q0), field_slopes(points, A, q), lame, work);
 }
 
 template struct Hex8<Hex8Strain::full>;

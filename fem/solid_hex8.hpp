@@ -19,9 +19,9 @@ template <Hex8Strain strain>
 struct Hex8 {
   static Eigen::MatrixXd stiffness(const Mesh&, const Element&);
   static void strain_points(const Mesh&, const Element&, const StrainPointVisitor&);
-  static Eigen::VectorXd strain_energy(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
-  static Eigen::MatrixXd prestress_work(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
-                                        const Eigen::Ref<const Eigen::MatrixXd>& q);
+  static Eigen::MatrixXd energy_strains(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
+  static void add_prestress_work(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
+                                 const Eigen::Ref<const Eigen::MatrixXd>& q, Eigen::Ref<Eigen::MatrixXd> work);
 };
 
 }  // namespace flexboom

@@ -45,12 +45,13 @@ template <class Row>
 void product_of_columns(const Columns& A, const Eigen::Ref<const Eigen::MatrixXd>& X, Index first,
                         Eigen::Ref<Eigen::MatrixXd> Y) {
   const auto rows = static_cast<size_t>(A.count);
-  std::vector<Row> x(rows), y(rows, Row{});
-  for (int c = 0; c < Row::width; ++c) {
+  const int width = static_cast<int>(std::min<Index>(Row::width, X.cols() - first));  // fewer: beside zeros
+  std::vector<Row> x(rows, Row{}), y(rows, Row{});
+  for (int c = 0; c < width; ++c) {
     for (size_t i = 0; i < rows; ++i) x[i].of[c] = X(static_cast<Index>(i), first + c);
   }
   add_product(A, x.data(), y.data());
-  for (int c = 0; c < Row::width; ++c) {
+  for (int c = 0; c < width; ++c) {
     for (size_t i = 0; i < rows; ++i) Y(static_cast<Index>(i), first + c) = y[i].of[c];
   }
 }
@@ -64,8 +65,8 @@ void symmetric_product(const SparseMatrix& A, const Eigen::Ref<const Eigen::Matr
   require(A.isCompressed(), "product: the matrix must be compressed");
   const Columns columns{A.cols(), A.outerIndexPtr(), A.innerIndexPtr(), A.valuePtr()};
   Index done = 0;
-  for (; done + 8 <= X.cols(); done += 8) product_of_columns<Eight>(columns, X, done, Y);
-  for (; done + 4 <= X.cols(); done += 4) product_of_columns<Four>(columns, X, done, Y);
+  for (; done + 4 < X.cols(); done += 8) product_of_columns<Eight>(columns, X, done, Y);
+  for (; done + 1 < X.cols(); done += 4) product_of_columns<Four>(columns, X, done, Y);
   for (; done < X.cols(); ++done) Y.col(done) = A.selfadjointView<Eigen::Lower>() * X.col(done);
 }
 

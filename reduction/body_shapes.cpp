@@ -21,12 +21,24 @@ bool has_rotations(const DofMap& dofs, const std::vector<int>& nodes) {
   return std::ranges::all_of(nodes, [&](int node) { return dofs.freedoms_of(node) == 6; });
 }
 
-/// J of the least squares theta = J^-1 sum r x u about the centre of the nodes.
-Matrix3d second_moment(const Mesh& mesh, const std::vector<int>& nodes, const Vector3d& centre) {
+/// Nodes with their shares in a mean, of sum 1.
+struct Weighted {
+  std::vector<int> nodes;
+  std::vector<double> weights;
+};
+
+Weighted equally(std::vector<int> nodes) {
+  const double weight = 1 / static_cast<double>(nodes.size());
+  std::vector<double> weights(nodes.size(), weight);
+  return {std::move(nodes), std::move(weights)};
+}
+
+/// J of the least squares theta = J^-1 sum w r x u about the centre of the nodes.
+Matrix3d second_moment(const Mesh& mesh, const Weighted& mean, const Vector3d& centre) {
   Matrix3d J = Matrix3d::Zero();
-  for (const int node : nodes) {
-    const Vector3d r = mesh.nodes.col(node) - centre;
-    J += r.squaredNorm() * Matrix3d::Identity() - r * r.transpose();
+  for (size_t i = 0; i < mean.nodes.size(); ++i) {
+    const Vector3d r = mesh.nodes.col(mean.nodes[i]) - centre;
+    J += mean.weights[i] * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose());
   }
   return J;
 }
@@ -47,22 +59,24 @@ std::vector<int> around(const Mesh& mesh, const std::vector<int>& nodes) {
   return {found.begin(), found.end()};
 }
 
-Vector3d centre_of(const Mesh& mesh, const std::vector<int>& nodes) {
-  return mesh.nodes(Eigen::all, nodes).rowwise().mean();
+Vector3d centre_of(const Mesh& mesh, const Weighted& mean) {
+  Vector3d centre = Vector3d::Zero();
+  for (size_t i = 0; i < mean.nodes.size(); ++i) centre += mean.weights[i] * mesh.nodes.col(mean.nodes[i]);
+  return centre;
 }
 
-/// theta = J^-1 sum r x u
-void add_fitted_rotation(MeanMotion& motion, const Mesh& mesh, const DofMap& dofs, const std::vector<int>& nodes) {
-  const Vector3d centre = centre_of(mesh, nodes);
-  const Matrix3d J = second_moment(mesh, nodes, centre);
+/// theta = J^-1 sum w r x u
+void add_fitted_rotation(MeanMotion& motion, const Mesh& mesh, const DofMap& dofs, const Weighted& mean) {
+  const Vector3d centre = centre_of(mesh, mean);
+  const Matrix3d J = second_moment(mesh, mean, centre);
   motion.turns = carries_rotation(J);
   if (!motion.turns) return;
   const Matrix3d inverse = J.inverse();
-  for (const int node : nodes) {
-    const Vector3d r = mesh.nodes.col(node) - centre;
+  for (size_t i = 0; i < mean.nodes.size(); ++i) {
+    const Vector3d r = mesh.nodes.col(mean.nodes[i]) - centre;
     for (int j = 0; j < 3; ++j) {
-      const Vector3d theta = inverse * r.cross(Vector3d::Unit(j));
-      for (int k = 0; k < 3; ++k) motion.rows.emplace_back(3 + k, dofs.of_node(node, j), theta(k));
+      const Vector3d theta = mean.weights[i] * (inverse * r.cross(Vector3d::Unit(j)));
+      for (int k = 0; k < 3; ++k) motion.rows.emplace_back(3 + k, dofs.of_node(mean.nodes[i], j), theta(k));
     }
   }
 }
@@ -86,17 +100,19 @@ MatrixXd MeanMotion::loads(int freedoms) const {
   return f;
 }
 
-MeanMotion mean_motion(const Mesh& mesh, const DofMap& dofs, const std::vector<int>& nodes) {
+MeanMotion mean_motion(const Mesh& mesh, const DofMap& dofs, const std::vector<int>& nodes,
+                       const std::vector<double>& weights) {
+  const Weighted mean = weights.empty() ? equally(nodes) : Weighted{nodes, weights};
   MeanMotion motion;
-  motion.position = centre_of(mesh, nodes);
-  const double weight = 1 / static_cast<double>(nodes.size());
+  motion.position = centre_of(mesh, mean);
   const bool own_rotations = has_rotations(dofs, nodes);
-  for (const int node : nodes) {
-    for (int k = 0; k < (own_rotations ? 6 : 3); ++k) motion.rows.emplace_back(k, dofs.of_node(node, k), weight);
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    for (int k = 0; k < (own_rotations ? 6 : 3); ++k)
+      motion.rows.emplace_back(k, dofs.of_node(nodes[i], k), mean.weights[i]);
   }
   if (own_rotations) return motion;
-  add_fitted_rotation(motion, mesh, dofs, nodes);
-  if (!motion.turns) add_fitted_rotation(motion, mesh, dofs, around(mesh, nodes));
+  add_fitted_rotation(motion, mesh, dofs, mean);
+  if (!motion.turns) add_fitted_rotation(motion, mesh, dofs, equally(around(mesh, nodes)));
   return motion;
 }
 

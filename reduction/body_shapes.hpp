@@ -8,10 +8,10 @@
 
 namespace flexboom {
 
-/// Mean motion of nodes, as a distributing connection (RBE3) with equal weights has it at their centre: rows ux uy uz
-/// rx ry rz over the freedoms of the mesh. Rotations are the mean of the nodes' own where they have any; nodes of
-/// solids on a line or alone take those of all nodes of the elements around them. `turns`: whether there are rotations
-/// at all.
+/// Mean motion of nodes, as a distributing connection (RBE3) has it at their centre: rows ux uy uz rx ry rz over the
+/// freedoms of the mesh. Weights, of sum 1, are equal where none are given. Rotations are the mean of the nodes' own
+/// where they have any; nodes of solids on a line or alone take those of all nodes of the elements around them.
+/// `turns`: whether there are rotations at all.
 struct MeanMotion {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // centre of the nodes, mesh axes [m]
   std::vector<Eigen::Triplet<double>> rows;            // (component, freedom, coefficient)
@@ -23,7 +23,8 @@ struct MeanMotion {
   /// Nodal forces of a unit force or torque along each component at the centre, freedoms x 6.
   Eigen::MatrixXd loads(int freedoms) const;
 };
-MeanMotion mean_motion(const Mesh&, const DofMap&, const std::vector<int>& nodes);
+MeanMotion mean_motion(const Mesh&, const DofMap&, const std::vector<int>& nodes,
+                       const std::vector<double>& weights = {});
 
 /// A marker at every interface and every other node set.
 std::vector<Marker> body_markers(const Mesh&, const DofMap&, const ModalBasis&);

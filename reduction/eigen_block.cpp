@@ -18,10 +18,11 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double tolerance_of_few = 1e-12;  // fewer than many_unknowns
-constexpr double tolerance_of_many = 1e-6;  // measured, see README
-constexpr double guard_tolerance = 1e-5;    // residual of the modes beyond those wanted
+constexpr double tolerance_of_many = 2e-7;  // measured, see README
+constexpr double guard_tolerance = 1e-4;    // residual of the modes beyond those wanted
 constexpr double negligible = 1e-13;        // a new direction this short, relative to its block, is round-off
 constexpr double same = 1e-6;               // Ritz values this close may be copies of one
+constexpr double random_part = 1e-4;        // of start vectors, beside shapes of size 1: what no shape holds
 constexpr Index max_block = 32;
 constexpr double singular = 1e15;  // largest nu times the scale of lambda: the shift is an eigenvalue
 
@@ -105,10 +106,13 @@ class BlockLanczos {
     return X;
   }
 
-  /// Random vectors, taken through the inverse once: that leaves nothing of freedoms without mass in them, and little
-  /// of high modes. Returns how many were outside the basis.
+  /// Random vectors, the first of them small beside the shapes that are given, taken through the inverse once: that
+  /// leaves nothing of freedoms without mass in them, and little of high modes. Returns how many were outside the
+  /// basis.
   Index start_afresh() {
-    const MatrixXd R = random_block(p_.K.rows(), start_width_, 20201116 + static_cast<std::uint64_t>(starts_));
+    MatrixXd R = random_block(p_.K.rows(), start_width_, 20201116 + static_cast<std::uint64_t>(starts_));
+    const Index given = std::min(start_width_, p_.start.cols());
+    if (starts_ == 0) R.leftCols(given) = random_part * R.leftCols(given) + p_.start.leftCols(given);
     const Index before = basis_.size();
     basis_.append(solve(symmetric_product(p_.M, R)), negligible);
     const Index added = basis_.size() - before;

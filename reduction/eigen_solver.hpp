@@ -18,6 +18,7 @@ struct EigenProblem {
   const SparseMatrix& K;
   const SparseMatrix& M;
   bool free_floating = false;  // the body can move freely: the shift must be negative
+  Eigen::MatrixXd start{};     // shapes that the lowest modes may resemble: time saved, nothing else; may be empty
 };
 
 /// When the eigenvalues below the last mode are counted by a second factorisation, which proves that none is missed.

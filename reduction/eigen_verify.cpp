@@ -12,8 +12,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
+#include <optional>
 
 namespace flexboom {
 namespace {
@@ -53,18 +55,67 @@ MatrixXd orthonormalise(const EigenProblem& p, MatrixXd& Phi) {
   return M_Phi;
 }
 
+/// Looks for modes that are missing, from random vectors outside those found, taken through the inverse twice. Their
+/// Rayleigh quotients are never below the lowest eigenvalue that is missing (Courant-Fischer): one below the last mode
+/// found proves that a mode was missed, none makes it unlikely.
+class Search {
+ public:
+  Search(const EigenProblem& p, const MatrixXd& Phi, const MatrixXd& M_Phi)
+      : p_(p), Phi_(Phi), M_Phi_(M_Phi), load_(symmetric_product(p.M, random_block(p.K.rows(), probes, 424242))) {}
+
+  /// What the inverse is wanted of next; no columns: nothing.
+  const MatrixXd& load() const { return load_; }
+
+  /// The inverse times load().
+  void take(MatrixXd X) {
+    add_product(X, -1, Transposed::no, Phi_, transposed_product(M_Phi_, X));
+    if (++solves_ == 1) {
+      X.colwise().normalize();
+      load_ = symmetric_product(p_.M, X);
+      return;
+    }
+    // With A = K - sigma M and Y the inverse times M X: Y^T A Y = Y^T M X, so 1 / (lambda - sigma) are the eigenvalues
+    // of Y^T M Y against it.
+    const MatrixXd mass = quadratic_form(p_.M, X);
+    const MatrixXd energy = X.transpose() * load_;
+    const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> ritz(mass, (energy + energy.transpose()) / 2,
+                                                                  Eigen::EigenvaluesOnly);
+    if (ritz.info() == Eigen::Success) lowest_ = 1 / ritz.eigenvalues().maxCoeff();
+    load_.resize(load_.rows(), 0);
+  }
+
+  /// Lowest lambda - sigma seen.
+  double lowest() const { return lowest_; }
+
+ private:
+  const EigenProblem& p_;
+  const MatrixXd& Phi_;
+  const MatrixXd& M_Phi_;
+  MatrixXd load_;
+  int solves_ = 0;
+  double lowest_ = std::numeric_limits<double>::infinity();
+};
+
 /// Residual of each pair in the shift-inverted problem: |(K - sigma M)^-1 M phi - phi / (lambda - sigma)|_M (lambda -
-/// sigma), a bound of the relative error of lambda - sigma. Read from the factor that is in place.
-VectorXd residuals(const EigenProblem& p, const SparseFactor& shifted, const EigenPairs& pairs, const MatrixXd& M_Phi) {
+/// sigma), a bound of the relative error of lambda - sigma. Read from the factor that is in place, together with what a
+/// search wants of it, if there is one.
+VectorXd residuals(const EigenProblem& p, const SparseFactor& shifted, const EigenPairs& pairs, const MatrixXd& M_Phi,
+                   Search* search) {
   VectorXd result(pairs.lambda.size());
-  for (Index first = 0; first < result.size(); first += slab) {
-    const Index width = std::min(slab, result.size() - first);
-    MatrixXd W = M_Phi.middleCols(first, width);
+  for (Index first = 0; first < result.size() || (search && search->load().cols() > 0);) {
+    const Index beside = search ? search->load().cols() : 0;
+    const Index width = std::min(slab - beside, result.size() - first);
+    MatrixXd W(M_Phi.rows(), width + beside);
+    W.leftCols(width) = M_Phi.middleCols(first, width);
+    if (beside > 0) W.rightCols(beside) = search->load();
     shifted.solve(W, W);
+    if (beside > 0) search->take(W.rightCols(beside));
+    W.conservativeResize(Eigen::NoChange, width);
     W *= (pairs.lambda.segment(first, width).array() - pairs.summary.sigma).matrix().asDiagonal();
     W -= pairs.Phi.middleCols(first, width);
     const MatrixXd M_W = symmetric_product(p.M, W);
     result.segment(first, width) = W.cwiseProduct(M_W).colwise().sum().transpose().cwiseMax(0).cwiseSqrt();
+    first += width;
   }
   return result;
 }
@@ -103,34 +154,15 @@ void sturm_check(const EigenProblem& p, double flops, EigenSummary& s, int expec
                         s.sturm_method);
 }
 
-/// Looks for modes that are missing, from random vectors outside those found, taken through the inverse twice. Their
-/// Rayleigh quotients are never below the lowest eigenvalue that is missing (Courant-Fischer): one below the last mode
-/// found proves that a mode was missed, none makes it unlikely.
-void probe(const EigenProblem& p, const SparseFactor& shifted, EigenPairs& pairs, const MatrixXd& M_Phi, int expected) {
-  MatrixXd X = symmetric_product(p.M, random_block(p.K.rows(), probes, 424242));
-  shifted.solve(X, X);
-  add_product(X, -1, Transposed::no, pairs.Phi, transposed_product(M_Phi, X));
-  X.colwise().normalize();
-  const MatrixXd M_X = symmetric_product(p.M, X);
-  MatrixXd Y(p.K.rows(), probes);
-  shifted.solve(M_X, Y);
-  add_product(Y, -1, Transposed::no, pairs.Phi, transposed_product(M_Phi, Y));
-  // With A = K - sigma M: Y^T A Y = Y^T M X, so 1 / (lambda - sigma) are the eigenvalues of Y^T M Y against it.
-  const MatrixXd mass = quadratic_form(p.M, Y);
-  const MatrixXd energy = Y.transpose() * M_X;
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> ritz(mass, (energy + energy.transpose()) / 2,
-                                                                Eigen::EigenvaluesOnly);
-  EigenSummary& s = pairs.summary;
-  const double lowest = s.sigma + 1 / ritz.eigenvalues().maxCoeff();
-  const double last = pairs.lambda(expected - 1);
-  if (ritz.info() == Eigen::Success && lowest - s.sigma < (1 - 1e-6) * (last - s.sigma)) {
-    throw NumericalError(
-        fmt::format("a search from random vectors found a mode below {:.6g} Hz that is missing", hertz(lowest)));
-  }
+/// Refuses modes above one that the search found.
+void judge(const Search& search, EigenSummary& s, double last, Index unknowns) {
+  if (search.lowest() < (1 - 1e-6) * (last - s.sigma))
+    throw NumericalError(fmt::format("a search from random vectors found a mode below {:.6g} Hz that is missing",
+                                     hertz(s.sigma + search.lowest())));
   s.proof = fmt::format(
       "completeness not proven: {} unknowns; ask for the Sturm count. A search from {} random vectors found nothing "
       "below {:.6g} Hz",
-      p.K.rows(), probes, hertz(last));
+      unknowns, probes, hertz(last));
 }
 
 /// Keeps the first `wanted` modes and lists the groups among them.
@@ -165,14 +197,16 @@ bool verify(const EigenProblem& p, ShiftedFactor& shifted, const EigenOptions& o
   int expected = 0;
   {
     const MatrixXd M_Phi = orthonormalise(p, pairs.Phi);
-    residual = residuals(p, shifted.factor(), pairs, M_Phi);
+    std::optional<Search> search;
+    if (!counts(shifted, options.sturm)) search.emplace(p, pairs.Phi, M_Phi);
+    residual = residuals(p, shifted.factor(), pairs, M_Phi, search ? &*search : nullptr);
     s.residual_max = residual.head(wanted).maxCoeff();
     if (!(s.residual_max <= std::max(max_residual, 100 * options.tolerance)))
       throw NumericalError(fmt::format("residual {:.2g} of the modes is too large", s.residual_max));
     s.orthogonality_error = distance_from_identity(transposed_product(pairs.Phi, M_Phi));
     expected = modes_below_gap(pairs, residual, wanted, complete);
     if (expected == 0) return false;
-    if (!counts(shifted, options.sturm)) probe(p, shifted.factor(), pairs, M_Phi, expected);
+    if (search) judge(*search, s, pairs.lambda(expected - 1), p.K.rows());
   }
   const double last = pairs.lambda(expected - 1);
   const bool has_next = expected < pairs.lambda.size();

@@ -1,6 +1,7 @@
 #include "reduction/geometric_stiffness.hpp"
 
 #include "fem/check.hpp"
+#include "fem/dense.hpp"
 #include "fem/parallel.hpp"
 #include "reduction/geometric_stiffness_loads.hpp"
 #include "reduction/static_shapes.hpp"
@@ -66,8 +67,22 @@ void relieve(Statics& statics, const Mesh& mesh, const Assembly& assembly, const
   statics.U0 = left.expanded(pinned.loaded(left.reduced_loads(statics.F)));
 }
 
+/// Displacements of a held body. The digits that the factor of a slender body loses are those of its lowest modes:
+/// where the stiffness of the shapes is known, they are restored there instead of by a second solve.
+MatrixXd displacements(const Assembly& assembly, const Unknowns& left, const MatrixXd& F, const MatrixXd& Phi,
+                       const GeometricOptions& options) {
+  const MatrixXd f = left.reduced_loads(F);
+  if (options.statics == nullptr) return left.expanded(StaticSolver(left.reduced(assembly.K), {}).loaded(f));
+  if (options.Ke == nullptr || Phi.cols() == 0) return left.expanded(options.statics->loaded(f));
+  const auto [x, left_over] = options.statics->loaded_once(f);
+  MatrixXd U0 = left.expanded(x), residual = MatrixXd::Zero(F.rows(), F.cols());
+  residual(left.free_dofs(), Eigen::all) = left_over;
+  add_product(U0, 1, Transposed::no, Phi, options.Ke->ldlt().solve(transposed_product(Phi, residual)));
+  return U0;
+}
+
 Statics statics(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const std::vector<MatrixXd>& loads,
-                const StaticSolver* held) {
+                const MatrixXd& Phi, const GeometricOptions& options) {
   Index count = 0;
   for (const MatrixXd& part : loads) count += part.cols();
   Statics result{MatrixXd(assembly.dofs.count, count), LinearFields::Zero(12, count), {}};
@@ -77,12 +92,10 @@ Statics statics(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, 
     first += part.cols();
   }
   const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
-  if (is_free(mesh, assembly.dofs, clamp)) {
+  if (is_free(mesh, assembly.dofs, clamp))
     relieve(result, mesh, assembly, left);
-    return result;
-  }
-  const MatrixXd f = left.reduced_loads(result.F);
-  result.U0 = left.expanded(held != nullptr ? held->loaded(f) : StaticSolver(left.reduced(assembly.K), {}).loaded(f));
+  else
+    result.U0 = displacements(assembly, left, result.F, Phi, options);
   return result;
 }
 
@@ -98,8 +111,8 @@ MatrixXd prestress_work(const Mesh& mesh, const DofMap& dofs, const MatrixXd& U0
     for (int e = elements * b / blocks; e < elements * (b + 1) / blocks; ++e) {
       const Element& element = mesh.elements[static_cast<size_t>(e)];
       const std::vector<int> element_dofs = dofs.of_element(mesh, e);
-      part +=
-          type_of(element).prestress_work(mesh, element, U0(element_dofs, Eigen::all), Phi(element_dofs, Eigen::all));
+      type_of(element).add_prestress_work(mesh, element, U0(element_dofs, Eigen::all), Phi(element_dofs, Eigen::all),
+                                          part);
     }
   });
   for (size_t b = 1; b < blocks; ++b) parts[0] += parts[b];
@@ -126,7 +139,7 @@ GeometricStiffness geometric_stiffness(const Mesh& mesh, const Assembly& assembl
                       assembly.dofs.count));
   std::vector<MatrixXd> loads = {inertial_forces(mesh, assembly)};
   for (const std::string& name : options.markers) loads.push_back(marker_forces(mesh, assembly.dofs, name));
-  const Statics state = statics(mesh, assembly, clamp, loads, options.statics);
+  const Statics state = statics(mesh, assembly, clamp, loads, Phi, options);
   const MatrixXd work = prestress_work(mesh, assembly.dofs, state.U0, Phi, options.threads);
   std::vector<MatrixXd> matrices;
   for (Index c = 0; c < work.cols(); ++c) matrices.push_back(unpacked(work.col(c), Phi.cols()));

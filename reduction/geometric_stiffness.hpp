@@ -18,6 +18,8 @@ struct GeometricOptions {
   /// Of K over the unknowns that the clamp leaves, nothing held beside it, where the caller has it: factorising anew is
   /// most of the work.
   const StaticSolver* statics = nullptr;
+  /// Of the shapes, Phi^T K Phi, where the caller has it: with `statics` every load is then solved once and not twice.
+  const Eigen::MatrixXd* Ke = nullptr;
 };
 
 /// Geometric stiffness of shapes Phi (freedoms x n) from the prestress of unit loads: linear statics of the body held

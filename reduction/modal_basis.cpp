@@ -3,6 +3,7 @@
 #include "fem/check.hpp"
 #include "reduction/mode_alignment.hpp"
 #include "reduction/reduced_matrices.hpp"
+#include "reduction/smooth_shapes.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -99,7 +100,8 @@ ModalBasis modes_of(const ModalModel& model, const Clamp& clamp, const Reduced& 
   EigenOptions whole = options;  // half a pair cannot be aligned, so its other half is solved for as well
   whole.num_modes = options.num_modes >= count ? options.num_modes : options.num_modes + 1;
   whole.whole_groups = true;
-  const EigenPairs pairs = solve_modes({reduced.K, reduced.M, rigid > 0}, whole);
+  const MatrixXd start = smooth_shapes(model.mesh, model.dofs)(reduced.unknowns.free_dofs(), Eigen::all);
+  const EigenPairs pairs = solve_modes({reduced.K, reduced.M, rigid > 0, start}, whole);
   const auto masses_of = [&](const MatrixXd& Phi) {
     return modal_masses(reduced.M, Phi(reduced.unknowns.free_dofs(), Eigen::all));
   };

@@ -14,19 +14,57 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-int nearest_node(const Mesh& mesh, const std::vector<int>& nodes, const Vector3d& place) {
-  return *std::ranges::min_element(nodes, {}, [&](int node) { return (mesh.nodes.col(node) - place).squaredNorm(); });
-}
-
-int tip_node(const Mesh& mesh, const Clamp& clamp) {
+/// The nodes of the set "tip", or those furthest from what is clamped; of several at one distance, those at the upper
+/// end along the long axis.
+std::vector<int> tip_nodes(const Mesh& mesh, const Clamp& clamp) {
   const auto set = mesh.node_sets.find("tip");
-  if (set != mesh.node_sets.end() && !set->second.empty())
-    return nearest_node(mesh, set->second, mesh.nodes(Eigen::all, set->second).rowwise().mean());
+  if (set != mesh.node_sets.end() && !set->second.empty()) return set->second;
   Vector3d held = mesh.nodes.rowwise().mean();
   if (!clamp.nodes.empty()) held = mesh.nodes(Eigen::all, clamp.nodes).rowwise().mean();
-  Index furthest = 0;
-  (mesh.nodes.colwise() - held).colwise().squaredNorm().maxCoeff(&furthest);
-  return static_cast<int>(furthest);
+  constexpr double equal = 1 - 1e-9;
+  const VectorXd distance = (mesh.nodes.colwise() - held).colwise().norm();
+  const VectorXd height = mesh.nodes.row(long_axis(mesh)).array() - mesh.nodes.row(long_axis(mesh)).minCoeff();
+  double furthest = distance.maxCoeff(), highest = 0;
+  for (Index a = 0; a < distance.size(); ++a) {
+    if (distance(a) >= equal * furthest) highest = std::max(highest, height(a));
+  }
+  std::vector<int> nodes;
+  for (Index a = 0; a < distance.size(); ++a) {
+    if (distance(a) >= equal * furthest && height(a) >= equal * highest) nodes.push_back(static_cast<int>(a));
+  }
+  return nodes;
+}
+
+/// Shares of nodes of solids in the area that they cover, int N_a dA, whatever the mesh of the face: N_a vanishes on
+/// all other faces of the elements with a node there but the outer ones beside it, which stand on it, so it is the
+/// part along the normal of int grad N_a dV. None where the nodes cover no face of the body.
+std::vector<double> face_shares(const Mesh& mesh, const std::vector<int>& nodes) {
+  std::vector<Index> place(static_cast<size_t>(mesh.nodes.cols()), -1);
+  for (size_t i = 0; i < nodes.size(); ++i) place[static_cast<size_t>(nodes[i])] = static_cast<Index>(i);
+  Eigen::Matrix3Xd area = Eigen::Matrix3Xd::Zero(3, std::ssize(nodes));
+  double size = 0;  // of what the elements add
+  for (const Element& element : mesh.elements) {
+    const auto place_of = [&](Index a) { return place[static_cast<size_t>(element.nodes[static_cast<size_t>(a)])]; };
+    std::vector<Index> here;
+    for (Index a = 0; a < std::ssize(element.nodes); ++a) {
+      if (place_of(a) >= 0) here.push_back(a);
+    }
+    if (here.empty()) continue;
+    if (type_of(element).shape == Shape::line) return {};
+    Eigen::Matrix3Xd part = Eigen::Matrix3Xd::Zero(3, std::ssize(here));
+    type_of(element).strain_points(mesh, element, [&](double volume, const MatrixXd& B, const MatrixXd&) {
+      for (size_t i = 0; i < here.size(); ++i) {
+        const Index a = here[i];
+        part.col(static_cast<Index>(i)) += volume * Vector3d(B(0, 3 * a), B(1, 3 * a + 1), B(2, 3 * a + 2));
+      }
+    });
+    for (size_t i = 0; i < here.size(); ++i) area.col(place_of(here[i])) += part.col(static_cast<Index>(i));
+    size += part.colwise().norm().sum();
+  }
+  const Vector3d normal = area.rowwise().sum();
+  if (!(normal.norm() > 1e-6 * size)) return {};
+  const VectorXd shares = area.transpose() * normal / normal.squaredNorm();
+  return {shares.begin(), shares.end()};
 }
 
 /// Motions e^s along x, y, z and e^s of twist about the long axis, s = 0 .. 1 along the body, over all freedoms: no
@@ -98,26 +136,19 @@ int leading_component(ModeKind kind, int axis) {
 
 ModeConvention::ModeConvention(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp)
     : axis_(long_axis(mesh)), length_((mesh.nodes.rowwise().maxCoeff() - mesh.nodes.rowwise().minCoeff()).norm()) {
-  const int tip = tip_node(mesh, clamp);
-  first_freedom_ = assembly.dofs.of_node(tip, 0);
-  tip_freedoms_ = assembly.dofs.freedoms_of(tip);
+  std::vector<int> tip = tip_nodes(mesh, clamp);
+  std::erase_if(tip, [&](int node) { return assembly.dofs.freedoms_of(node) < 3; });
+  if (!tip.empty()) tip_ = mean_motion(mesh, assembly.dofs, tip, face_shares(mesh, tip));
   mass_ = total_mass(mesh, assembly);
   const MatrixXd motions = growing_motions(mesh, assembly.dofs, axis_);
   M_mean_ = symmetric_product(assembly.M, motions);
   mean_scale_ = motions.cwiseProduct(M_mean_).colwise().sum().cwiseMax(0).cwiseSqrt().transpose();
 }
 
-/// Motion (u, theta) of the tip in every mode, 6 x n; a node of solids has no theta.
-MatrixXd ModeConvention::tip_motion(const MatrixXd& Phi) const {
-  MatrixXd motion = MatrixXd::Zero(6, Phi.cols());
-  motion.topRows(tip_freedoms_) = Phi.middleRows(first_freedom_, tip_freedoms_);
-  return motion;
-}
-
 /// The motions of the tip, then the mean motions: 10 x n.
 MatrixXd ModeConvention::functionals(const MatrixXd& Phi) const {
   MatrixXd F(10, Phi.cols());
-  F.topRows(6) = tip_motion(Phi);
+  F.topRows(6) = tip_.of(Phi);
   F.bottomRows(4) = M_mean_.transpose() * Phi;
   return F;
 }

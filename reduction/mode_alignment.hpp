@@ -1,6 +1,7 @@
 #pragma once
 
 #include "fem/constraints.hpp"
+#include "reduction/body_shapes.hpp"
 #include "reduction/mode_kind.hpp"
 
 #include <Eigen/Core>
@@ -12,7 +13,8 @@ namespace flexboom {
 /// Direction, sign and size of modes, so that they depend neither on the solver nor on the numbering of the mesh.
 class ModeConvention {
  public:
-  /// The tip is the node of the set "tip" nearest to its middle, or the node furthest from what is clamped.
+  /// The tip is the mean of the node set "tip", by area where its nodes cover a face; else of the nodes furthest from
+  /// what is clamped.
   ModeConvention(const Mesh&, const Assembly&, const Clamp&);
 
   /// Turns each group of M-orthonormal columns of Phi (all freedoms x n): they take up, one after the other, the tip's
@@ -27,13 +29,11 @@ class ModeConvention {
   double mass() const { return mass_; }
 
  private:
-  Eigen::MatrixXd tip_motion(const Eigen::MatrixXd& Phi) const;
   Eigen::MatrixXd functionals(const Eigen::MatrixXd& Phi) const;
   double factor(const Eigen::VectorXd& phi, const Eigen::VectorXd& tip, const Eigen::VectorXd& mean,
                 int component) const;
 
-  int first_freedom_ = 0;  // of the tip
-  int tip_freedoms_ = 0;
+  MeanMotion tip_;
   int axis_ = 0;  // along which the body is longest
   double mass_ = 0;
   double length_ = 0;

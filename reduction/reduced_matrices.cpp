@@ -34,8 +34,7 @@ class GramSum {
 
  private:
   void flush() {
-    if (filled_ == 0) return;  // a product of nothing divides by zero in Eigen
-    sum_.selfadjointView<Eigen::Lower>().rankUpdate(block_.leftCols(filled_));
+    add_gram(sum_, block_.leftCols(filled_));
     filled_ = 0;
   }
 
@@ -126,42 +125,31 @@ MatrixXd gram_of_solids(const Mesh& mesh, const Assembly& assembly, const Matrix
   return (gram + gram.transpose()) / 2;
 }
 
-/// Sum of (B Phi)^T w D (B Phi) over strain points, some of an element at a time: one product with its shapes.
-class StiffnessSum {
+/// Sum of E E^T over many columns of E, some at a time: products of blocks that repay the call.
+class StrainSum {
  public:
-  explicit StiffnessSum(Index n) : sum_(MatrixXd::Zero(n, n)) {}
+  explicit StrainSum(Index n) : sum_(MatrixXd::Zero(n, n)), block_(n, 2048) {}
 
-  /// The points until flush have the same shapes, and strains of the same number of rows.
-  void add(double weight, const MatrixXd& B, const MatrixXd& D, const MatrixXd& shapes) {
-    if (filled_ > 0 && (filled_ + B.rows() > B_.rows() || B.rows() != D_.rows())) flush(shapes);
-    if (filled_ == 0) {
-      B_.resize(points * B.rows(), B.cols());
-      D_.resize(B.rows(), points * B.rows());
-    }
-    B_.middleRows(filled_, B.rows()) = B;
-    D_.middleCols(filled_, B.rows()) = weight * D;
-    filled_ += B.rows();
+  void add(const MatrixXd& E) {
+    if (filled_ + E.cols() > block_.cols()) flush();
+    if (E.cols() > block_.cols()) return add_gram(sum_, E);
+    block_.middleCols(filled_, E.cols()) = E;
+    filled_ += E.cols();
   }
 
-  void flush(const MatrixXd& shapes) {
-    if (filled_ == 0) return;
-    const Index rows = D_.rows();
-    strain_.setZero(filled_, shapes.cols());
-    add_product(strain_, 1, Transposed::no, B_.topRows(filled_), shapes);
-    stress_.resize(filled_, shapes.cols());
-    for (Index first = 0; first < filled_; first += rows) {
-      stress_.middleRows(first, rows).noalias() = D_.middleCols(first, rows) * strain_.middleRows(first, rows);
-    }
-    add_product(sum_, 1, Transposed::yes, strain_, stress_);
+  const MatrixXd& sum() {
+    flush();
+    return sum_;
+  }
+
+ private:
+  void flush() {
+    add_gram(sum_, block_.leftCols(filled_));
     filled_ = 0;
   }
 
-  const MatrixXd& sum() const { return sum_; }
-
- private:
-  static constexpr Index points = 32;
-  MatrixXd sum_, B_, D_, strain_, stress_;
-  Index filled_ = 0;  // rows of B_
+  MatrixXd sum_, block_;
+  Index filled_ = 0;
 };
 
 }  // namespace
@@ -186,16 +174,13 @@ MatrixXd gram_matrix(const Mesh& mesh, const Assembly& assembly, const MatrixXd&
 }
 
 MatrixXd reduced_stiffness(const Mesh& mesh, const DofMap& dofs, const MatrixXd& Phi, int threads) {
-  const MatrixXd Ke = sum_over_elements(
-      mesh, threads, [&] { return StiffnessSum(Phi.cols()); },
-      [&](int e, StiffnessSum& sum) {
-        const MatrixXd shapes = Phi(dofs.of_element(mesh, e), Eigen::all);
+  const MatrixXd lower = sum_over_elements(
+      mesh, threads, [&] { return StrainSum(Phi.cols()); },
+      [&](int e, StrainSum& sum) {
         const Element& element = mesh.elements[static_cast<size_t>(e)];
-        type_of(element).strain_points(
-            mesh, element, [&](double weight, const MatrixXd& B, const MatrixXd& D) { sum.add(weight, B, D, shapes); });
-        sum.flush(shapes);
+        sum.add(type_of(element).energy_strains(mesh, element, Phi(dofs.of_element(mesh, e), Eigen::all)));
       });
-  return (Ke + Ke.transpose()) / 2;
+  return lower.selfadjointView<Eigen::Lower>();
 }
 
 }  // namespace flexboom

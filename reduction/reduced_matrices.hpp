@@ -13,7 +13,8 @@ Eigen::MatrixXd gram_matrix(const Mesh&, const Assembly&, const Eigen::MatrixXd&
 /// The same, point by point: for beams, and the check of the other route.
 Eigen::MatrixXd gram_matrix_by_points(const Mesh&, const DofMap&, const Eigen::MatrixXd& Phi, int threads = 1);
 
-/// Ke = sum w (B Phi)^T D (B Phi) over the strain points: Phi^T K Phi, but without the cancellation in K Phi.
+/// Ke = sum w (B Phi)^T D (B Phi) over the strain points (energy_strains of the elements): Phi^T K Phi, but without the
+/// cancellation in K Phi.
 Eigen::MatrixXd reduced_stiffness(const Mesh&, const DofMap&, const Eigen::MatrixXd& Phi, int threads = 1);
 
 }  // namespace flexboom

@@ -89,4 +89,14 @@ MatrixXd StaticSolver::loaded(const MatrixXd& f) const {
   return x;
 }
 
+std::pair<MatrixXd, MatrixXd> StaticSolver::loaded_once(const MatrixXd& f) const {
+  const MatrixXd f_left = f(left_, Eigen::all);
+  MatrixXd x_left(f_left.rows(), f.cols());
+  factor_->solve(f_left, x_left);
+  std::pair<MatrixXd, MatrixXd> result{MatrixXd::Zero(count_, f.cols()), MatrixXd::Zero(count_, f.cols())};
+  result.first(left_, Eigen::all) = x_left;
+  result.second(left_, Eigen::all) = f_left - symmetric_product(K_.first, x_left);
+  return result;
+}
+
 }  // namespace flexboom

@@ -25,6 +25,10 @@ class StaticSolver {
   /// x of loads f (all unknowns x k), zero where held.
   Eigen::MatrixXd loaded(const Eigen::MatrixXd& f) const;
 
+  /// The same at half the time, without a second solve for the digits that the factor of a slender body loses; and the
+  /// loads that are left over, f - K x, zero where held.
+  std::pair<Eigen::MatrixXd, Eigen::MatrixXd> loaded_once(const Eigen::MatrixXd& f) const;
+
  private:
   Eigen::MatrixXd solve(const Eigen::MatrixXd& f) const;
 

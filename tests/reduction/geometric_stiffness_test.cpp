@@ -2,8 +2,11 @@
 
 #include "fem/check.hpp"
 #include "fem/solid_boom.hpp"
+#include "fem/sparse_factor.hpp"
+#include "reduction/geometric_stiffness_loads.hpp"
 #include "reduction/inertia_invariants.hpp"
 #include "reduction/modal_basis.hpp"
+#include "reduction/reduced_matrices.hpp"
 #include "tests/reduction/geometric_stiffness_testing.hpp"
 
 #include <gtest/gtest.h>
@@ -65,7 +68,9 @@ class PrestressWork : public ::testing::TestWithParam<Row> {
     return q;
   }
   MatrixXd work(const Mesh& mesh, const MatrixXd& q0, const MatrixXd& q) const {
-    return type().prestress_work(mesh, mesh.elements[0], q0, q);
+    MatrixXd work = MatrixXd::Zero(q.cols() * (q.cols() + 1) / 2, q0.cols());
+    type().add_prestress_work(mesh, mesh.elements[0], q0, q, work);
+    return work;
   }
 };
 
@@ -83,6 +88,25 @@ TEST_P(PrestressWork, IsSymmetricInTheShapesAndLinearInTheLoads) {
     EXPECT_LT((A - B).cwiseAbs().maxCoeff(), 1e-13 * scale);
   }
   EXPECT_LT((W.col(2) - 2 * W.col(0) + 3 * W.col(1)).cwiseAbs().maxCoeff(), 1e-12 * scale);
+}
+
+// Kernels take eight pairs and six loads at a time: more than that, and what is left over.
+TEST_P(PrestressWork, OfManyIsThatOfEach) {
+  const Mesh mesh = body(distort);
+  const Index shapes = 11, loads = 8;
+  const MatrixXd q = some_vectors(mesh, shapes), q0 = some_vectors(mesh, shapes + loads).rightCols(loads);
+  const MatrixXd W = work(mesh, q0, q);
+  for (Index c = 0; c < loads; ++c) {
+    const MatrixXd A = unpacked(W.col(c), shapes);
+    for (Index k = 0; k < shapes; ++k) {
+      MatrixXd two(q.rows(), 2);
+      two << q.col(k), q.col(shapes - 1);
+      const VectorXd alone = work(mesh, q0.col(c), two);  // kk, k last, last last
+      const double scale = 1e-13 * A.cwiseAbs().maxCoeff();
+      EXPECT_NEAR(A(k, k), alone(0), scale);
+      EXPECT_NEAR(A(k, shapes - 1), alone(1), scale);
+    }
+  }
 }
 
 TEST_P(PrestressWork, OfARigidTranslationIsZero) {
@@ -302,8 +326,9 @@ TEST(GeometricStiffness, OfAnAccelerationIsThatOfItsInertialForces) {
     for (int e = 0; e < std::ssize(model.mesh.elements); ++e) {
       const Element& element = model.mesh.elements[size_t(e)];
       const std::vector<int> dofs = model.assembly.dofs.of_element(model.mesh, e);
-      expected +=
-          unpacked(type_of(element).prestress_work(model.mesh, element, u0(dofs), Phi(dofs, Eigen::all)).col(0), 6);
+      VectorXd work = VectorXd::Zero(21);
+      type_of(element).add_prestress_work(model.mesh, element, u0(dofs), Phi(dofs, Eigen::all), work);
+      expected += unpacked(work, 6);
     }
     const NodalBody& lump = model.mesh.bodies.at(0);
     const MatrixXd theta = Phi.middleRows<3>(model.assembly.dofs.of_node(lump.node, 3));
@@ -332,14 +357,36 @@ TEST(GeometricStiffness, DoesNotDependOnThreadsNorOnWhoFactorises) {
   const SparseMatrix K = unknowns(model.mesh, model.assembly.dofs, model.clamp).reduced(model.assembly.K);
   ASSERT_NE(basis.factor, nullptr);  // of K: a clamped body is solved with shift 0
   const StaticSolver statics(K, {}), of_modes(basis.factor, K);
+  const MatrixXd Ke = reduced_stiffness(model.mesh, model.assembly.dofs, Phi);
   const std::vector<MatrixXd> one = matrices({}), three = matrices({.markers = {}, .threads = 3}),
                               given = matrices({.markers = {}, .threads = 1, .statics = &statics}),
-                              handed = matrices({.markers = {}, .threads = 1, .statics = &of_modes});
+                              handed = matrices({.markers = {}, .threads = 1, .statics = &of_modes}),
+                              once = matrices({.markers = {}, .threads = 1, .statics = &of_modes, .Ke = &Ke});
   for (size_t i = 0; i < one.size(); ++i) {
     EXPECT_EQ(one[i], three[i]);
     EXPECT_LT((one[i] - given[i]).norm(), 1e-9 * (one[i].norm() + one[2].norm()));
     EXPECT_LT((one[i] - handed[i]).norm(), 1e-9 * (one[i].norm() + one[2].norm()));
+    EXPECT_LT((one[i] - once[i]).norm(), 1e-9 * (one[i].norm() + one[2].norm()));
   }
+}
+
+// A factor that is wrong by 1e-3: shapes that hold the static displacements restore all that it loses.
+TEST(GeometricStiffness, StaticsAreCorrectedInTheSpanOfTheShapes) {
+  const Model model = beam(strip, length, BeamTheory::timoshenko, 4, 3);
+  const Unknowns left = unknowns(model.mesh, model.assembly.dofs, model.clamp);
+  const SparseMatrix K = left.reduced(model.assembly.K), wrong = 1.001 * K;
+  const MatrixXd f = left.reduced_loads(inertial_forces(model.mesh, model.assembly));
+  const MatrixXd Phi = left.expanded(StaticSolver(K, {}).loaded(f(Eigen::all, {2, 7})));  // stretched, bent
+  const MatrixXd Ke = reduced_stiffness(model.mesh, model.assembly.dofs, Phi);
+  auto factor = std::make_shared<SparseFactor>(wrong, FactorKind::definite);
+  factor->factorise(wrong);
+  const StaticSolver statics(factor, K);
+  const auto matrices = [&](const GeometricOptions& options) {
+    return geometric_stiffness(model.mesh, model.assembly, model.clamp, Phi, options);
+  };
+  const GeometricStiffness exact = matrices({}),
+                           corrected = matrices({.markers = {}, .threads = 1, .statics = &statics, .Ke = &Ke});
+  EXPECT_LT((corrected.spin[2] - exact.spin[2]).norm(), 1e-9 * exact.spin[2].norm());
 }
 
 TEST(GeometricStiffness, SaysWhatIsWrong) {

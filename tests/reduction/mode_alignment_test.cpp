@@ -67,7 +67,8 @@ double difference(const ReducedBody& a, const ReducedBody& b) {
 using MakeBody = std::function<ReducedBody(const Mesh&, const std::string& backend)>;
 
 EigenOptions first(int modes, const std::string& backend) {
-  return {.num_modes = modes, .sigma = {}, .backend = backend};
+  // Beyond 2000 unknowns the default tolerances leave 1e-9 in the shapes.
+  return {.num_modes = modes, .sigma = {}, .tolerance = backend == "block" ? 1e-12 : 1e-14, .backend = backend};
 }
 
 ReducedBody clamped(const Mesh& mesh, const std::string& backend) {
@@ -119,6 +120,44 @@ TEST(ModeAlignment, PairsOfARoundSolidBar) {
     const ReducedBody body = make(mesh, "arpack");
     EXPECT_LT(difference(body, make(mesh, "block")), 1e-9);
     EXPECT_LT(difference(body, make(renumbered(mesh, 3), "arpack")), 1e-9);
+  }
+}
+
+/// One cell across and an odd order: no node lies on the axis, and the face of the tip decides. A short bar: a slender
+/// one has 1e-9 of round-off in its factor at order 5.
+Mesh without_axis(int order, int along) {
+  BeamGeometry bar = boom4(BeamTheory::timoshenko, true);
+  bar.segments[0].length = 0.06;
+  SolidOptions options;
+  options.order = order;
+  options.grading = {.sectors = 1, .rings = 1, .long_elements = along, .end_layers = 0, .corner_levels = 0};
+  return make_solid_mesh(bar, options);
+}
+
+/// Largest part of Ct and Cr0 of bending modes outside their plane.
+double out_of_plane(const ReducedBody& body) {
+  double largest = 0;
+  for (Index k = 0; k < body.n(); ++k) {
+    const std::string& kind = body.coordinates[static_cast<size_t>(k)].kind;
+    if (kind != "bending_y" && kind != "bending_z") continue;
+    const Index along = kind == "bending_y" ? 1 : 2;
+    largest = std::max(largest, std::abs(body.Ct(3 - along, k)) / std::sqrt(body.m * body.Me(k, k)));
+    largest = std::max(largest, std::abs(body.Cr0(along, k)) / std::sqrt(body.J0.trace() * body.Me(k, k)));
+  }
+  return largest;
+}
+
+TEST(ModeAlignment, PairsOfABarWithoutANodeOnItsAxis) {
+  for (const int order : {3, 5}) {
+    const Mesh mesh = without_axis(order, 2);
+    ASSERT_FALSE(mesh.node_sets.contains("tip_center"));
+    for (const MakeBody& make : {MakeBody(clamped), MakeBody(free_body), MakeBody(held_twice)}) {
+      const ReducedBody body = make(mesh, "arpack");
+      EXPECT_LT(difference(body, make(mesh, "block")), 1e-9) << order;
+      EXPECT_LT(difference(body, make(renumbered(mesh, 3), "arpack")), 1e-9) << order;
+    }
+    EXPECT_LT(out_of_plane(clamped(mesh, "arpack")), 1e-9) << order;
+    EXPECT_LT(out_of_plane(clamped(without_axis(order, 3), "block")), 1e-9) << order;
   }
 }
 
