@@ -1,14 +1,13 @@
 #include "dynamics/cvode.hpp"
 
 #include "dynamics/crossing.hpp"
-#include "dynamics/workspace.hpp"
+#include "dynamics/ode.hpp"
+#include "dynamics/sundials.hpp"
 #include "fem/check.hpp"
 
 #include <cvode/cvode.h>
 #include <fmt/format.h>
 #include <nvector/nvector_serial.h>
-#include <sundials/sundials_linearsolver.h>
-#include <sundials/sundials_matrix.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -19,32 +18,12 @@ namespace flexboom {
 
 namespace {
 
-template <class T, auto Free>
-struct Deleter {
-  void operator()(T* p) const { Free(p); }
-};
-using VectorHandle = std::unique_ptr<_generic_N_Vector, Deleter<_generic_N_Vector, N_VDestroy>>;
-
-struct ContextHandle {
-  SUNContext context = nullptr;
-  ContextHandle() {
-    if (SUNContext_Create(nullptr, &context) != 0) throw NumericalError("SUNDIALS: no context");
-  }
-  ~ContextHandle() { SUNContext_Free(&context); }
-  ContextHandle(const ContextHandle&) = delete;
-  ContextHandle& operator=(const ContextHandle&) = delete;
-};
-
-void quiet(int, const char*, const char*, char*, void*) noexcept {}
-
-/// CVODE on one System. The matrix handed to CVODE is a token: I - gamma J lives in the Workspace in its condensed
-/// form, which costs a factorisation of u x u instead of y x y.
+/// CVODE on one system. The matrix handed to CVODE is a token: I - gamma J lives in the Ode in its own form.
 class CvodeStepper final : public Stepper {
  public:
-  CvodeStepper(const System& system, const ErrorScale& scale, int method)
-      : system_(system), scale_(scale), work_(system.workspace()) {
-    const auto n = static_cast<sunindextype>(system.layout().size);
-    const auto hinges = static_cast<int>(system.appendages().size());
+  CvodeStepper(std::unique_ptr<Ode> ode, const ErrorScale& scale, int method) : ode_(std::move(ode)), scale_(scale) {
+    const auto n = static_cast<sunindextype>(ode_->size());
+    const int hinges = ode_->stops();
     contact_.assign(static_cast<size_t>(hinges), 0);
     armed_.assign(static_cast<size_t>(hinges), 0);
     before_.resize(armed_.size());
@@ -53,7 +32,7 @@ class CvodeStepper final : public Stepper {
     make_linear_solver();
     cvode_ = CVodeCreate(method, context_.context);
     if (cvode_ == nullptr || !y_ || !out_) throw NumericalError("SUNDIALS: out of memory");
-    check(CVodeSetErrHandlerFn(cvode_, quiet, nullptr), "CVodeSetErrHandlerFn");
+    check(CVodeSetErrHandlerFn(cvode_, sundials::quiet, nullptr), "CVodeSetErrHandlerFn");
     check(CVodeInit(cvode_, &CvodeStepper::rhs, 0.0, y_.get()), "CVodeInit");
     check(CVodeSetUserData(cvode_, this), "CVodeSetUserData");
     check(CVodeWFtolerances(cvode_, &CvodeStepper::weights), "CVodeWFtolerances");
@@ -123,7 +102,7 @@ class CvodeStepper final : public Stepper {
     solver_->ops->setup = [](SUNLinearSolver, SUNMatrix) { return 0; };
     solver_->ops->solve = [](SUNLinearSolver s, SUNMatrix, N_Vector x, N_Vector b, realtype) {
       auto& self = *static_cast<CvodeStepper*>(s->content);
-      self.system_.solve_newton(N_VGetArrayPointer(b), *self.work_, N_VGetArrayPointer(x));
+      self.ode_->solve(N_VGetArrayPointer(b), N_VGetArrayPointer(x));
       return 0;
     };
   }
@@ -132,7 +111,7 @@ class CvodeStepper final : public Stepper {
   Clearance clearance(const Eigen::VectorXd& y, size_t i) const {
     const double side = contact_[i] ? 1 : -1;
     const int hinge = static_cast<int>(i);
-    return {0, side * system_.gap(y.data(), hinge), side * system_.gap_rate(y.data(), hinge)};
+    return {0, side * ode_->gap(y.data(), hinge), side * ode_->gap_rate(y.data(), hinge)};
   }
 
   /// CVODE looks at the signs at both ends of a step: a contact that begins and ends within it is found here.
@@ -164,17 +143,22 @@ class CvodeStepper final : public Stepper {
     y = state;
   }
 
-  static int rhs(realtype, N_Vector y, N_Vector y_dot, void* user) noexcept {
+  static int rhs(realtype t, N_Vector y, N_Vector y_dot, void* user) noexcept {
     auto& self = *static_cast<CvodeStepper*>(user);
-    self.system_.derivative(N_VGetArrayPointer(y), self.contact_, *self.work_, N_VGetArrayPointer(y_dot));
-    return 0;
+    try {
+      self.ode_->derivative(t, N_VGetArrayPointer(y), self.contact_, N_VGetArrayPointer(y_dot));
+      return 0;
+    } catch (...) {  // a function of time may throw
+      self.error_ = std::current_exception();
+      return -1;
+    }
   }
 
   static int gaps(realtype, N_Vector y, realtype* g, void* user) noexcept {
     auto& self = *static_cast<CvodeStepper*>(user);
     const double* state = N_VGetArrayPointer(y);
     for (size_t i = 0; i < self.armed_.size(); ++i)
-      g[i] = self.armed_[i] ? self.system_.gap(state, static_cast<int>(i)) : 1.0;
+      g[i] = self.armed_[i] ? self.ode_->gap(state, static_cast<int>(i)) : 1.0;
     return 0;
   }
 
@@ -186,17 +170,17 @@ class CvodeStepper final : public Stepper {
     return 0;
   }
 
-  static int linear_system(realtype, N_Vector y, N_Vector, SUNMatrix, booleantype jacobian_is_current,
+  static int linear_system(realtype t, N_Vector y, N_Vector, SUNMatrix, booleantype jacobian_is_current,
                            booleantype* jacobian_was_updated, realtype gamma, void* user, N_Vector, N_Vector,
                            N_Vector) noexcept {
     auto& self = *static_cast<CvodeStepper*>(user);
     try {
       if (!jacobian_is_current) {
-        self.system_.jacobian(N_VGetArrayPointer(y), self.contact_, *self.work_);
+        self.ode_->jacobian(t, N_VGetArrayPointer(y), self.contact_);
         ++self.jacobians_;
       }
       *jacobian_was_updated = !jacobian_is_current;
-      self.system_.factorise_newton(gamma, *self.work_);
+      self.ode_->factorise(gamma);
       return 0;
     } catch (...) {
       self.error_ = std::current_exception();
@@ -231,11 +215,10 @@ class CvodeStepper final : public Stepper {
     c.jacobian_evaluations = jacobians_;
   }
 
-  const System& system_;
+  std::unique_ptr<Ode> ode_;
   const ErrorScale& scale_;
-  ContextHandle context_;
-  WorkspaceHandle work_;
-  VectorHandle y_, out_;
+  sundials::Context context_;
+  sundials::Vector y_, out_;
   SUNMatrix matrix_ = nullptr;
   SUNLinearSolver solver_ = nullptr;
   void* cvode_ = nullptr;
@@ -251,11 +234,19 @@ class CvodeStepper final : public Stepper {
 }  // namespace
 
 std::unique_ptr<Stepper> make_cvode_bdf(const System& system, const ErrorScale& scale) {
-  return std::make_unique<CvodeStepper>(system, scale, CV_BDF);
+  return make_cvode_bdf(ode_of(system), scale);
 }
 
 std::unique_ptr<Stepper> make_cvode_adams(const System& system, const ErrorScale& scale) {
-  return std::make_unique<CvodeStepper>(system, scale, CV_ADAMS);
+  return make_cvode_adams(ode_of(system), scale);
+}
+
+std::unique_ptr<Stepper> make_cvode_bdf(std::unique_ptr<Ode> ode, const ErrorScale& scale) {
+  return std::make_unique<CvodeStepper>(std::move(ode), scale, CV_BDF);
+}
+
+std::unique_ptr<Stepper> make_cvode_adams(std::unique_ptr<Ode> ode, const ErrorScale& scale) {
+  return std::make_unique<CvodeStepper>(std::move(ode), scale, CV_ADAMS);
 }
 
 }  // namespace flexboom

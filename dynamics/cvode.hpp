@@ -1,6 +1,7 @@
 #pragma once
 
 #include "dynamics/integrator.hpp"
+#include "dynamics/ode.hpp"
 
 namespace flexboom {
 
@@ -9,5 +10,9 @@ std::unique_ptr<Stepper> make_cvode_bdf(const System&, const ErrorScale&);
 
 /// CVODE's variable-order Adams-Moulton formulas with the same Newton iteration.
 std::unique_ptr<Stepper> make_cvode_adams(const System&, const ErrorScale&);
+
+/// The same on any system.
+std::unique_ptr<Stepper> make_cvode_bdf(std::unique_ptr<Ode>, const ErrorScale&);
+std::unique_ptr<Stepper> make_cvode_adams(std::unique_ptr<Ode>, const ErrorScale&);
 
 }  // namespace flexboom

@@ -43,4 +43,15 @@ Dual<N> cos(const Dual<N>& a) {
   return {std::cos(a.v), -std::sin(a.v) * a.d};
 }
 
+template <int N>
+Dual<N> sqrt(const Dual<N>& a) {
+  const double root = std::sqrt(a.v);
+  return {root, (0.5 / root) * a.d};
+}
+
+template <int N>
+Dual<N> atan2(const Dual<N>& y, const Dual<N>& x) {
+  return {std::atan2(y.v, x.v), (x.v * y.d - y.v * x.d) * (1 / (x.v * x.v + y.v * y.v))};
+}
+
 }  // namespace flexboom

@@ -4,18 +4,16 @@
 // motion"). Internal to `dynamics`.
 
 #include "dynamics/dual.hpp"
+#include "dynamics/gravity_terms.hpp"
 #include "dynamics/spatial.hpp"
 #include "dynamics/system.hpp"
 
 #include <cmath>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 namespace flexboom::equations {
-
-using spatial::Mat3;
-using spatial::Sym3;
-using spatial::Vec3;
 
 /// One non-zero of J1 (component: xx, yy, zz, xy, yz, zx), J2 (the same) or Cr1 (component: x, y, z). A straight boom
 /// that bends in one plane has a handful, a general body n^2 times six: the loops run over what the body has.
@@ -66,6 +64,7 @@ struct BodyScratch {
   std::vector<T> b, g;      // modal force and Me^-1 of it, n
   Vec3<T> t0, w0;           // hinge row after elimination of q
   T b0{}, inverse_J_left{};
+  GravityLoad gravity;  // in a field only
 };
 
 template <class T>
@@ -227,11 +226,32 @@ void modal_forces(const Body& body, const Vec3<T>& w, const T* q, const T* q_dot
   for (const Term& t : body.Cr1) s.b[static_cast<size_t>(t.k)] += (2.0 * t.value) * (*wi[t.component] * q_dot[t.l]);
 }
 
+/// Adds gravity to force, torque and modal forces (`s.b`) of one body in its own axes: m a + G mc, mc x a + axial(G J),
+/// Ct^T a - 1/2 G : dJ/dq_k. `field`: about the hub's origin, hub axes; w: of the body; Ct_rate = Ct q_dot.
+inline void add_gravity(const Body& body, const Gravity& field, const Vec3<double>& w_hub, const Vec3<double>& w,
+                        const double* q, const Inertia<double>& inertia, const Vec3<double>& Ct_rate,
+                        BodyScratch<double>& s, Vec3<double>& ft, Vec3<double>& fw) {
+  const Gravity here = field.at(body.d, s.A);
+  const Vec3<double>& a = here.acceleration;
+  const Sym3<double>& G = here.gradient;
+  const Vec3<double> force = body.m * a + G * inertia.mc;
+  const Vec3<double> torque = cross(inertia.mc, a) + gradient_torque(G, inertia.J);
+  ft += force;
+  fw += torque;
+  const double g[] = {G.xx, G.yy, G.zz, 2 * G.xy, 2 * G.yz, 2 * G.zx};
+  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) s.b[k] += dot(body.Ct[k], a);
+  for (const Term& t : body.J1) s.b[static_cast<size_t>(t.k)] -= 0.5 * t.value * g[t.component];
+  for (const Term& t : body.J2) s.b[static_cast<size_t>(t.k)] -= t.value * q[t.l] * g[t.component];
+  s.gravity.force = s.A * force;
+  s.gravity.power = dot(s.gravity.force, cross(w_hub, body.d)) + dot(torque, w) + dot(a, Ct_rate) -
+                    0.5 * contraction(G, inertia.J_dot);
+}
+
 /// First sweep: one body's equations at its own frame acceleration (a, alpha), with q_ddot and Delta_ddot eliminated,
-/// added to the hub's.
+/// added to the hub's. `field`: gravity about the hub's origin, hub axes, or null; of values only, not of derivatives.
 template <class T>
 void condense(const Body& body, const Vec3<T>& w_hub, const T* p, const T* u, bool contact, BodyScratch<T>& s,
-              bool fixed_hub, HubSystem<T>& hub) {
+              bool fixed_hub, HubSystem<T>& hub, [[maybe_unused]] const Gravity* field = nullptr) {
   const auto n = static_cast<size_t>(body.n);
   const T* q = p + 1;
   const T* q_dot = u + 1;
@@ -258,6 +278,9 @@ void condense(const Body& body, const Vec3<T>& w_hub, const T* p, const T* u, bo
   Vec3<T> ft = -(cross(w, cross(w, inertia.mc) + 2.0 * Ct_rate) + body.m * a_bias + cross(alpha_bias, inertia.mc));
   Vec3<T> fw =
       -(cross(w, inertia.J * w + Cr_rate) + inertia.J_dot * w + cross(inertia.mc, a_bias) + inertia.J * alpha_bias);
+
+  if constexpr (std::is_same_v<T, double>)
+    if (field) add_gravity(body, *field, w_hub, w, q, inertia, Ct_rate, s, ft, fw);
 
   // Eliminate q_ddot, then Delta_ddot.
   s.t0 = {-inertia.mc.y, inertia.mc.x, T(0.0)};
@@ -372,6 +395,15 @@ HubSystem<T> bare_hub(const Model& model, const Vec3<T>& w) {
   return hub;
 }
 
+/// Force and torque of gravity on the hub alone, about its origin, hub axes.
+struct GravityOnHub {
+  Vec3<double> force, torque;
+};
+inline GravityOnHub gravity_on_hub(const Model& model, const Gravity& field) {
+  return {model.hub_m * field.acceleration + field.gradient * model.hub_mc,
+          cross(model.hub_mc, field.acceleration) + gradient_torque(field.gradient, model.hub_J)};
+}
+
 /// Second sweep: Delta_ddot and q_ddot of one body from the accelerations of the hub. S may be double where T is Dual:
 /// a body whose own state is held constant.
 template <class S, class T>
@@ -385,16 +417,22 @@ void release(const Body& body, const BodyScratch<S>& s, const Vec3<T>& a_hub, co
 }
 
 /// u_dot and the acceleration of the hub's origin in hub axes, from p = (Delta, q)... and u = (omega, Delta_dot,
-/// q_dot...).
+/// q_dot...). `field`: gravity about the hub's origin, hub axes, or null.
 template <class T>
 void accelerations(const Model& model, const T* p, const T* u, std::span<const char> contact, Scratch<T>& scratch,
-                   T* u_dot, Vec3<T>& a_hub) {
+                   T* u_dot, Vec3<T>& a_hub, [[maybe_unused]] const Gravity* field = nullptr) {
   const int base = model.fixed_hub ? 0 : 3;
   const Vec3<T> w_hub = model.fixed_hub ? Vec3<T>{} : Vec3<T>{u[0], u[1], u[2]};
   HubSystem<T> hub = bare_hub(model, w_hub);
+  if constexpr (std::is_same_v<T, double>)
+    if (field) {
+      const GravityOnHub g = gravity_on_hub(model, *field);
+      hub.ft += g.force, hub.fw += g.torque;
+    }
   for (size_t i = 0; i < model.bodies.size(); ++i) {
     const Body& body = model.bodies[i];
-    condense(body, w_hub, p + body.at, u + base + body.at, contact[i] != 0, scratch.bodies[i], model.fixed_hub, hub);
+    condense(body, w_hub, p + body.at, u + base + body.at, contact[i] != 0, scratch.bodies[i], model.fixed_hub, hub,
+             field);
   }
   a_hub = Vec3<T>{};
   Vec3<T> alpha_hub{};
@@ -404,6 +442,16 @@ void accelerations(const Model& model, const T* p, const T* u, std::span<const c
   }
   for (size_t i = 0; i < model.bodies.size(); ++i)
     release(model.bodies[i], scratch.bodies[i], a_hub, alpha_hub, u_dot + base + model.bodies[i].at);
+}
+
+/// Power of gravity on hub and bodies [W] with the loads that `accelerations` left in the scratch; v, w: of the hub,
+/// hub axes.
+inline double gravity_power(const Model& model, const Gravity& field, const Scratch<double>& scratch,
+                            const Vec3<double>& v, const Vec3<double>& w) {
+  const GravityOnHub hub = gravity_on_hub(model, field);
+  double power = dot(hub.force, v) + dot(hub.torque, w);
+  for (const BodyScratch<double>& s : scratch.bodies) power += dot(s.gravity.force, v) + s.gravity.power;
+  return power;
 }
 
 }  // namespace flexboom::equations

@@ -195,20 +195,31 @@ class ExponentialStepper final : public Stepper {
     first_ = false;
   }
 
-  /// F, hub acceleration and dissipated power at point j.
+  /// F, hub acceleration (hub axes) and dissipated power at point j.
   void evaluate(int j) {
+    if (system_.field()) {
+      if (j == 0)
+        y_ = start_;
+      else
+        state_at(step_.grid->at[static_cast<size_t>(j)], collocation::node(j), y_);
+    }
     y_.head(nx_) = step_.X.col(j);
-    system_.derivative(y_.data(), contact_, *work_, y_dot_.data());
+    const double t = j == 0 ? step_.start : step_.start + collocation::node(j) * step_.length;
+    system_.derivative(t, y_.data(), contact_, *work_, y_dot_.data());
     ++counts_.rhs_evaluations;
     F_.col(j) = y_dot_.head(nx_);
     power_[j] = y_dot_[layout_.dissipated()];
-    if (!system_.fixed_hub()) acceleration_.col(j) = y_dot_.segment<3>(layout_.velocity());
+    if (system_.fixed_hub()) return;
+    acceleration_.col(j) = y_dot_.segment<3>(layout_.velocity());
+    if (system_.field())
+      acceleration_.col(j) = rotation_matrix(y_.segment<4>(layout_.attitude())).transpose() * acceleration_.col(j);
   }
 
   /// Sweeps until the points stand still; returns the error in units of the one allowed, infinite when they do not.
   double solve(double left) {
     const Index m = step_.linear->size();
     predict();
+    acceleration_.rightCols<degree>().colwise() = acceleration_.col(0).eval();  // a failed step left what it had
     double last_change = 0;
     for (int sweep = 0; sweep < max_sweeps; ++sweep) {
       step_.M.noalias() = step_.length * N_ * scaled_coefficients_;
@@ -225,6 +236,7 @@ class ExponentialStepper final : public Stepper {
       if (sweep > 0 && change * ratio <= 0.1) break;
       if (sweep + 1 == max_sweeps) return std::numeric_limits<double>::infinity();
       last_change = change;
+      if (system_.field()) follow();  // gravity depends on attitude and place
       for (int j = 1; j < points; ++j) evaluate(j);
       step_.linear->remainder(F_.rightCols(degree), step_.Z.rightCols(degree), N_.rightCols(degree));
     }
@@ -279,7 +291,7 @@ class ExponentialStepper final : public Stepper {
     return on_ladder(h);
   }
 
-  /// What follows p and u and does not act back: attitude, velocity, position, dissipated energy.
+  /// What follows p and u: attitude, velocity, position, dissipated energy. It acts back in a field of gravity only.
   void follow() {
     const auto to_coefficients = collocation::coefficients();
     power_coefficients_ = to_coefficients.transpose() * power_;
@@ -312,22 +324,24 @@ class ExponentialStepper final : public Stepper {
 
   /// The state at a fraction c of the step.
   void state_at(double c, VectorXd& y) {
-    const GridPoint* at = &step_.grid->at[degree];
-    if (c != 1) step_.linear->point(c, step_.length, scratch_), at = &scratch_;
+    if (c != 1) step_.linear->point(c, step_.length, scratch_);
+    state_at(c == 1 ? step_.grid->at[degree] : scratch_, c, y);
+  }
+  void state_at(const GridPoint& at, double c, VectorXd& y) {
     y.resize(layout_.size);
-    step_.linear->combine(*at, 0, step_.Z.col(0), step_.M, integral_);
+    step_.linear->combine(at, 0, step_.Z.col(0), step_.M, integral_);
     small_product(step_.linear->from_modes, integral_, y.head(nx_));
     y[layout_.dissipated()] =
         start_[layout_.dissipated()] + step_.length * power_coefficients_.dot(collocation::integrals(c));
     if (system_.fixed_hub()) return;
     const auto I = collocation::integrals(c);
-    step_.linear->combine(*at, 1, step_.Z.col(0), step_.M, integral_);
+    step_.linear->combine(at, 1, step_.Z.col(0), step_.M, integral_);
     const Vector3d theta = step_.length * (step_.linear->omega_modes.lazyProduct(integral_) + C_ * I);
     const Vector4d attitude = start_.segment<4>(layout_.attitude());
     const Eigen::Matrix3d A = rotation_matrix(attitude);
     y.segment<4>(layout_.attitude()) = quaternion_product(attitude, quaternion_of(theta));
     const Vector3d dv = step_.length * (step_.linear->a_hub_modes.lazyProduct(integral_) + G_ * I);
-    step_.linear->combine(*at, 2, step_.Z.col(0), step_.M, integral_);
+    step_.linear->combine(at, 2, step_.Z.col(0), step_.M, integral_);
     const Vector3d dr = step_.length * step_.length *
                         (step_.linear->a_hub_modes.lazyProduct(integral_) + G_ * collocation::double_integrals(c));
     const Vector3d v0 = start_.segment<3>(layout_.velocity());

@@ -291,7 +291,7 @@ class Flight {
   /// Does something push a hinge that is on its stop, so that it will not stay there? A boom that is pressed against
   /// its stop swings in it, and comes back to where the stop begins with no rate left.
   bool pushed(size_t i) {
-    system_.derivative(y_.data(), contacts_.closed, *work_, y_dot_.data());
+    system_.derivative(t_, y_.data(), contacts_.closed, *work_, y_dot_.data());
     const Appendage& a = system_.appendages()[i];
     const double period = std::sqrt(a.body.J0(2, 2) / (a.hinge.mechanism.stiffness + a.hinge.mechanism.stop_stiffness));
     const double push = system_.gap_rate(y_dot_.data(), static_cast<int>(i));
@@ -341,7 +341,7 @@ class Flight {
       H = std::max(H, b.angular_momentum_scale);
     }
     s.energy_balance = energy > 0 ? gap / energy : 0;
-    if (!system_.fixed_hub()) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
+    if (!system_.fixed_hub() && !system_.field()) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
   }
 
   const System& system_;
@@ -365,6 +365,7 @@ std::span<const IntegratorMethod> integrator_methods() { return methods; }
 Trajectory integrate(const System& system, const VectorXd& y0, const IntegratorOptions& options) {
   check_options(options);
   require(y0.size() == system.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
+  if (system.field()) system.field()->orbit.at(options.duration);  // does it last so long?
   return Flight(system, y0, options, method_named(options.method)).fly();
 }
 

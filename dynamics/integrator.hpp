@@ -25,6 +25,11 @@ struct IntegratorOptions {
   /// Measure the hinge's error against its motion since the last event instead of its largest motion: late, tiny
   /// contacts keep their relative accuracy. Costs steps.
   bool rescale_at_events = false;
+  /// Times where forces or prescribed motions are not smooth, ascending [s]: a step ends there and the method starts
+  /// anew. Of trees.
+  std::vector<double> corners{};
+  /// No step passes an output: what forces do for as long as that is not stepped over. Of trees.
+  bool step_to_outputs = false;
   long max_steps = 200'000'000;
   const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
   std::function<void(double time, double duration)> progress;  // called now and then
@@ -50,7 +55,7 @@ struct IntegrationSummary {
   long restarts = 0;
   double seconds = 0;
   double energy_balance = 0;    // max |E + dissipated - E0| / max E
-  double momentum_drift = 0;    // max change of linear and angular momentum, each over its scale
+  double momentum_drift = 0;    // max change of linear and angular momentum, each over its scale; 0 in a field
   double constraint_drift = 0;  // max | |quaternion| - 1 |; the joints are exact in relative coordinates
   std::vector<double> settled;  // per hinge: time after which its stop was no longer looked at, or -1
   bool interrupted = false;

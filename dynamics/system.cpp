@@ -1,5 +1,6 @@
 #include "dynamics/system.hpp"
 
+#include "dynamics/body_constants.hpp"
 #include "dynamics/hub_check.hpp"
 #include "dynamics/rotation.hpp"
 #include "dynamics/workspace.hpp"
@@ -49,72 +50,6 @@ void check_hinge(const Hinge& h) {
           fmt::format("hinge {}: stiffness, damping and stop stiffness must not be negative", h.name));
 }
 
-template <class Pack>
-auto pack_columns(const Eigen::Matrix3Xd& m, Pack pack) {
-  std::vector<Vec3<double>> r;
-  for (Eigen::Index k = 0; k < m.cols(); ++k) r.push_back(pack(m.col(k)));
-  return r;
-}
-
-std::vector<double> row_major(const MatrixXd& m) {
-  std::vector<double> r;
-  for (Eigen::Index i = 0; i < m.rows(); ++i)
-    for (Eigen::Index j = 0; j < m.cols(); ++j) r.push_back(m(i, j));
-  return r;
-}
-
-/// Entries below this share of the largest of their kind are round-off of the reduction.
-constexpr double negligible = 1e-14;
-
-/// Non-zeros of a family of matrices A[k] (or A[k][l]); `entry(k, l, component)` reads it.
-template <class Entry>
-std::vector<equations::Term> non_zeros(int n, int second, int components, Entry entry) {
-  double largest = 0;
-  std::vector<equations::Term> terms;
-  for (int k = 0; k < n; ++k)
-    for (int l = 0; l < second; ++l)
-      for (int c = 0; c < components; ++c) {
-        terms.push_back({k, l, c, entry(static_cast<size_t>(k), l, c)});
-        largest = std::max(largest, std::abs(terms.back().value));
-      }
-  std::erase_if(terms, [=](const equations::Term& t) { return std::abs(t.value) <= negligible * largest; });
-  return terms;
-}
-
-double symmetric_entry(const Matrix3d& m, int component) {
-  constexpr int row[] = {0, 1, 2, 0, 1, 2}, column[] = {0, 1, 2, 1, 2, 0};
-  return m(row[component], column[component]);
-}
-
-bool is_diagonal(const MatrixXd& m) {
-  const VectorXd d = m.diagonal().cwiseAbs().cwiseSqrt();
-  for (Eigen::Index i = 0; i < m.rows(); ++i)
-    for (Eigen::Index j = 0; j < m.cols(); ++j)
-      if (i != j && std::abs(m(i, j)) > 1e-12 * d[i] * d[j]) return false;  // modes are orthogonal to round-off
-  return true;
-}
-
-void pack_invariants(const ReducedBody& b, equations::Body& r) {
-  const auto to_vec = [](const auto& c) { return vec3(c); };
-  r.n = b.n();
-  r.m = b.m;
-  r.mc0 = vec3(b.mc0);
-  r.J0 = spatial::sym3(b.J0);
-  r.Ct = pack_columns(b.Ct, to_vec);
-  r.Cr0 = pack_columns(b.Cr0, to_vec);
-  r.J1 = non_zeros(r.n, 1, 6, [&](size_t k, int, int c) { return symmetric_entry(b.J1[k], c); });
-  r.J2 = non_zeros(r.n, r.n, 6,
-                   [&](size_t k, int l, int c) { return symmetric_entry(b.J2[k][static_cast<size_t>(l)], c); });
-  r.Cr1 = non_zeros(r.n, r.n, 3, [&](size_t k, int l, int c) { return b.Cr1[k](c, l); });
-  r.Ke = row_major(b.Ke);
-  r.De = row_major(b.De);
-  r.diagonal = is_diagonal(b.Ke) && is_diagonal(b.De) && is_diagonal(b.Me);
-  const MatrixXd Me_inverse = r.n ? MatrixXd(b.Me.llt().solve(MatrixXd::Identity(r.n, r.n))) : MatrixXd(0, 0);
-  r.Me_inverse = row_major(0.5 * (Me_inverse + Me_inverse.transpose()));
-  r.Gt = pack_columns(b.Ct * Me_inverse, to_vec);
-  r.Ctt = r.n ? spatial::sym3(b.Ct * Me_inverse * b.Ct.transpose()) : spatial::Sym3<double>{};
-}
-
 void pack_hinge(const Hinge& h, equations::Body& r) {
   const Matrix3d B = hinge_axes(h);
   r.d = vec3(h.point);
@@ -145,12 +80,16 @@ struct System::Impl {
   ReducedBody hub;
   std::vector<Appendage> appendages;
   bool fixed_hub = false;
+  std::optional<OrbitalField> field;
   Layout layout;
   equations::Model model;
 };
 
-System::System(ReducedBody hub, std::vector<Appendage> appendages, bool fixed_hub) : impl_(std::make_unique<Impl>()) {
+System::System(ReducedBody hub, std::vector<Appendage> appendages, bool fixed_hub, std::optional<OrbitalField> field)
+    : impl_(std::make_unique<Impl>()) {
   Impl& s = *impl_;
+  require(!(fixed_hub && field), "a hub that is fixed in inertial space is in no orbit: leave out one of the two");
+  s.field = std::move(field);
   s.fixed_hub = fixed_hub;
   if (!fixed_hub) {
     hub.validate();
@@ -187,6 +126,7 @@ System::System(System&&) noexcept = default;
 const ReducedBody& System::hub() const { return impl_->hub; }
 const std::vector<Appendage>& System::appendages() const { return impl_->appendages; }
 bool System::fixed_hub() const { return impl_->fixed_hub; }
+const std::optional<OrbitalField>& System::field() const { return impl_->field; }
 const Layout& System::layout() const { return impl_->layout; }
 
 void WorkspaceDeleter::operator()(Workspace* w) const { delete w; }
@@ -280,14 +220,31 @@ Vector3d to_inertial(const double* q, const Vector3d& a) {
   return a + q[0] * t + v.cross(t);
 }
 
+/// Gravity about the hub's origin, hub axes.
+[[gnu::noinline]] equations::Gravity hub_gravity(const OrbitalField& field, double t, const Layout& l,
+                                                 const double* y) {
+  const Matrix3d A = rotation_matrix(Eigen::Map<const Vector4d>(y + l.attitude()));
+  const LocalGravity g = field.at(t, Eigen::Map<const Vector3d>(y + l.position())).in_axes(A);
+  return {vec3(g.acceleration), spatial::sym3(g.gradient)};
+}
+
+/// Velocity of the hub's origin, hub axes.
+[[gnu::noinline]] Vec3<double> hub_velocity(const Layout& l, const double* y) {
+  const Matrix3d A = rotation_matrix(Eigen::Map<const Vector4d>(y + l.attitude()));
+  return vec3(A.transpose() * Eigen::Map<const Vector3d>(y + l.velocity()));
+}
+
 }  // namespace
 
 FLEXBOOM_INNER_LOOP
-void System::derivative(const double* y, std::span<const char> contact, Workspace& w, double* y_dot) const {
+void System::derivative(double t, const double* y, std::span<const char> contact, Workspace& w, double* y_dot) const {
   const Layout& l = impl_->layout;
   const double* u = y + l.u_begin();
+  equations::Gravity gravity;
+  if (impl_->field) gravity = hub_gravity(*impl_->field, t, l, y);
   Vec3<double> a_hub;
-  equations::accelerations(impl_->model, y, u, contact, w.scratch, y_dot + l.u_begin(), a_hub);
+  equations::accelerations(impl_->model, y, u, contact, w.scratch, y_dot + l.u_begin(), a_hub,
+                           impl_->field ? &gravity : nullptr);
   for (int i = 0; i < l.p; ++i) y_dot[i] = u[l.base + i];
   if (!impl_->fixed_hub) {
     for (int i = 0; i < 3; ++i) y_dot[l.position() + i] = y[l.velocity() + i];
@@ -295,6 +252,9 @@ void System::derivative(const double* y, std::span<const char> contact, Workspac
     Eigen::Map<Vector3d>(y_dot + l.velocity()) = to_inertial(y + l.attitude(), spatial::eigen(a_hub));
   }
   y_dot[l.dissipated()] = dissipated_power(impl_->model, u, l.base);
+  if (impl_->field)
+    y_dot[l.dissipated()] -=
+        equations::gravity_power(impl_->model, gravity, w.scratch, hub_velocity(l, y), {u[0], u[1], u[2]});
 }
 
 namespace {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "dynamics/gravity.hpp"
 #include "dynamics/hinge.hpp"
 #include "dynamics/spatial.hpp"
 #include "reduction/reduced_body.hpp"
@@ -7,6 +8,7 @@
 #include <Eigen/Core>
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,7 +32,7 @@ struct State {
   std::vector<double> rate;                            // [rad/s]
   std::vector<Eigen::VectorXd> q;                      // per appendage
   std::vector<Eigen::VectorXd> q_dot;
-  double dissipated = 0;  // energy lost since the start [J]
+  double dissipated = 0;  // energy lost since the start; in a field of gravity less the work of gravity [J]
 };
 
 /// Energies [J] and momenta (inertial axes, about the inertial origin).
@@ -72,14 +74,18 @@ using WorkspaceHandle = std::unique_ptr<Workspace, WorkspaceDeleter>;
 /// construction.
 class System {
  public:
-  /// @throws InputError when a body is invalid, a hinge's directions are not orthonormal, or a mass matrix is singular.
-  System(ReducedBody hub, std::vector<Appendage> appendages, bool fixed_hub = false);
+  /// In a `field`, positions are relative to its reference point, and so is the gravity that all bodies feel.
+  /// @throws InputError when a body is invalid, a hinge's directions are not orthonormal, a mass matrix is singular, or
+  /// a fixed hub is in a field.
+  System(ReducedBody hub, std::vector<Appendage> appendages, bool fixed_hub = false,
+         std::optional<OrbitalField> field = {});
   ~System();
   System(System&&) noexcept;
 
   const ReducedBody& hub() const;
   const std::vector<Appendage>& appendages() const;
   bool fixed_hub() const;
+  const std::optional<OrbitalField>& field() const;
   const Layout& layout() const;
 
   Eigen::VectorXd pack(const State&) const;
@@ -91,11 +97,15 @@ class System {
   WorkspaceHandle workspace() const;
 
   /// y_dot = f(y) with the stops closed where contact[i] is set (the kink is not looked at here: events switch it).
-  /// Allocates nothing.
-  void derivative(const double* y, std::span<const char> contact, Workspace&, double* y_dot) const;
+  /// Allocates nothing. The time [s] counts in a field only.
+  void derivative(double t, const double* y, std::span<const char> contact, Workspace&, double* y_dot) const;
+  void derivative(const double* y, std::span<const char> contact, Workspace& w, double* y_dot) const {
+    derivative(0, y, contact, w, y_dot);
+  }
 
   /// The Jacobian blocks at y, exact by forward differentiation: d(u_dot)/d(p, u) and d(a_hub)/d(p, u), kept in the
-  /// workspace together with the state they were taken at.
+  /// workspace together with the state they were taken at. Gravity is left out: its part is of the order of the orbital
+  /// rate squared, 1e-6 1/s^2.
   void jacobian(const double* y, std::span<const char> contact, Workspace&) const;
 
   /// Prepares solves with I - gamma J. @throws NumericalError when it is singular.

@@ -1,4 +1,4 @@
-#include "dynamics_testing.hpp"
+#include "tree_testing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -42,6 +42,28 @@ TEST(Allocation, RightHandSideJacobianAndNewtonSolveMakeNone) {
     system.factorise_newton(1e-3, *work);
     system.solve_newton(y_dot.data(), *work, y_dot.data());
   }
+  EXPECT_EQ(allocations - before, 0);
+}
+
+TEST(Allocation, RightHandSideOfATreeMakesNone) {
+  std::mt19937 random(1);
+  Multibody scene;
+  for (int i = 0; i < 4; ++i) {
+    scene.bodies.push_back(eq14::reduced_body(testing::round_boom(0.295, 0.005), 3, eq14::Planes::xy_and_xz, "boom"));
+    scene.joints.push_back(testing::joint("joint", i == 0 ? JointKind::free : JointKind::hinge,
+                                          i == 0 ? testing::place(-1) : testing::at_marker(i - 1, "tip"),
+                                          i == 3 ? testing::at_marker(3, "tip") : testing::place(i)));
+    scene.bodies.back().J0(0, 0) += 1e-4;
+  }
+  scene.joints[1].prescribed.push_back(testing::swing(1));
+  scene.loads.push_back({"push", testing::at_marker(2, "tip"), true, {[](double t) { return t; }, {}, {}}, {}});
+  const Tree tree(scene);
+  const auto work = tree.workspace();
+  const Eigen::VectorXd y = tree.pack(testing::random_state(tree, random));
+  Eigen::VectorXd y_dot(y.size());
+  const std::vector<char> contact(4, 0);
+  const long before = allocations;
+  for (int i = 0; i < 10; ++i) tree.derivative(0.1 * i, y.data(), contact, *work, y_dot.data());
   EXPECT_EQ(allocations - before, 0);
 }
 

@@ -25,7 +25,7 @@ struct Case {
   VectorXd y;
   std::vector<char> contact = {1, 0};
 
-  explicit Case(bool fixed_hub = false) {
+  explicit Case(bool fixed_hub = false, const std::optional<OrbitalField>& field = {}) {
     J_hub(0, 1) = J_hub(1, 0) = 0.05;
     std::vector<Appendage> appendages;
     for (int i = 0; i < 2; ++i) {
@@ -37,7 +37,7 @@ struct Case {
       hinge.mechanism = {0.3, 1.2, 0.02, 9.0, 1.4};
       appendages.push_back({points.back().body, hinge});
     }
-    system = std::make_unique<System>(rigid_body("hub", 2.5, Vector3d::Zero(), J_hub), appendages, fixed_hub);
+    system = std::make_unique<System>(rigid_body("hub", 2.5, Vector3d::Zero(), J_hub), appendages, fixed_hub, field);
     std::uniform_real_distribution<double> uniform(-1, 1);
     State s = system->at_rest({1.6, 0.9});
     const auto noise = [&] { return uniform(random); };
@@ -64,8 +64,8 @@ struct Case {
   }
 };
 
-/// u_dot and hub acceleration by virtual power over the point masses: no invariant is formed.
-VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub) {
+/// u_dot, hub acceleration and power of gravity by virtual power over the point masses: no invariant is formed.
+VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub, double& power) {
   const State s = c.system->unpack(c.y);
   const Layout& l = c.system->layout();
   const int n = 3 + l.u;  // hub translation (hub axes), then u
@@ -74,6 +74,13 @@ VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub) {
   M.topLeftCorner<3, 3>() = c.system->hub().m * Matrix3d::Identity();
   M.block<3, 3>(3, 3) = c.J_hub;
   f.segment<3>(3) = -s.omega.cross(c.J_hub * s.omega);
+  LocalGravity gravity;  // about the hub's origin, hub axes
+  if (c.system->field()) gravity = c.system->field()->at(0, s.position).in_axes(rotation_matrix(s.attitude));
+  const BodyGravity of_hub = body_gravity(c.system->hub(), gravity, VectorXd());
+  const Vector3d v = rotation_matrix(s.attitude).transpose() * s.velocity;
+  f.head<3>() += of_hub.force;
+  f.segment<3>(3) += of_hub.torque;
+  power = of_hub.force.dot(v) + of_hub.torque.dot(s.omega);
   for (size_t i = 0; i < c.points.size(); ++i) {
     const PointBody& p = c.points[i];
     const Appendage& a = c.system->appendages()[i];
@@ -91,7 +98,9 @@ VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub) {
       const Vector3d bias = s.omega.cross(s.omega.cross(r)) + 2 * s.omega.cross(r_dot) +
                             C * (s.rate[i] * s.rate[i] * z.cross(z.cross(x)) + 2 * s.rate[i] * z.cross(x_dot));
       M += p.dm[k] * B.transpose() * B;
-      f -= p.dm[k] * B.transpose() * bias;
+      const Vector3d pull = p.dm[k] * gravity.at(r).acceleration;
+      f += B.transpose() * (pull - p.dm[k] * bias);
+      power += pull.dot(v + s.omega.cross(r) + r_dot);
     }
     const HingeMechanism& h = a.hinge.mechanism;
     f[at] += h.stiffness * (h.rest - s.angle[i]) - h.damping * s.rate[i];
@@ -106,13 +115,31 @@ VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub) {
 TEST(System, AccelerationsAgreeWithVirtualPowerOverPointMasses) {
   const Case c;
   Vector3d a_hub;
-  const VectorXd expected = oracle_accelerations(c, a_hub);
+  double power = 0;
+  const VectorXd expected = oracle_accelerations(c, a_hub, power);
   const VectorXd y_dot = c.derivative(c.y);
   const Layout& l = c.system->layout();
   // Round-off of a solve with a condition number near 1e3.
   EXPECT_LT((y_dot.segment(l.p, l.u) - expected).norm(), 1e-12 * expected.norm());
   const Vector3d inertial = rotation_matrix(c.system->unpack(c.y).attitude) * a_hub;
   EXPECT_LT((y_dot.segment<3>(l.velocity()) - inertial).norm(), 1e-12 * inertial.norm());
+}
+
+/// A gradient of 0.7 1/s^2, as strong as the motion; linear, as it is within a body.
+TEST(System, AccelerationsInAFieldOfGravityAgreeWithVirtualPower) {
+  const Orbit orbit({.semi_major_axis = 1e3, .inclination = 0.9, .mean_anomaly = 0.4}, {.mu = 0.7e9});
+  const Case c(false, OrbitalField{orbit, false}), free;
+  Vector3d a_hub;
+  double power = 0;
+  const VectorXd expected = oracle_accelerations(c, a_hub, power);
+  const VectorXd y_dot = c.derivative(c.y);
+  const Layout& l = c.system->layout();
+  EXPECT_LT((y_dot.segment(l.p, l.u) - expected).norm(), 1e-12 * expected.norm());
+  EXPECT_GT((free.derivative(c.y).segment(l.p, l.u) - expected).norm(), 1e-2 * expected.norm());
+  const Vector3d inertial = rotation_matrix(c.system->unpack(c.y).attitude) * a_hub;
+  EXPECT_LT((y_dot.segment<3>(l.velocity()) - inertial).norm(), 1e-12 * inertial.norm());
+  EXPECT_NEAR(free.derivative(c.y)[l.dissipated()] - y_dot[l.dissipated()], power, 1e-12 * std::abs(power));
+  EXPECT_THROW(Case(true, OrbitalField{orbit}), InputError);
 }
 
 TEST(System, BodyMadeOfPointsHasConsistentInvariants) { EXPECT_NO_THROW(Case().points[0].body.validate()); }

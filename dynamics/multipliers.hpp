@@ -1,0 +1,124 @@
+#pragma once
+
+#include "dynamics/multibody.hpp"
+#include "dynamics/system.hpp"
+
+#include <Eigen/Core>
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// Where a body is and how it moves. Positions are relative to the reference point, in inertial axes; the quaternion
+/// (w, x, y, z) turns BRF -> inertial.
+struct BodyState {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();      // R [m]
+  Eigen::Vector4d attitude = Eigen::Vector4d(1, 0, 0, 0);  // unit
+  Eigen::VectorXd q{};                                     // empty: zeros
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      // Rdot, inertial axes [m/s]
+  Eigen::Vector3d omega = Eigen::Vector3d::Zero();         // BRF axes [rad/s]
+  Eigen::VectorXd q_dot{};                                 // empty: zeros
+};
+
+/// What a joint's constraints do to b, at the place b, in the axes of place a; a gets the opposite. The mechanism's own
+/// torque is not in it, the torque of a prescribed motion is.
+struct JointReaction {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   // [N]
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();  // [N m]
+};
+
+/// A moment of a motion.
+struct MultibodyState {
+  std::vector<BodyState> bodies;
+  std::vector<double> coordinate, rate;  // per joint: angle of a hinge [rad], way of a slider [m]; 0 of the others
+  std::vector<JointReaction> loads;      // per joint
+  std::vector<double> spin;              // per wheel, relative to its body [rad/s]
+  double supplied = 0;                   // work of loads, prescribed motions and wheels less what dampers took [J]
+};
+
+struct MultipliersOptions {
+  double tolerance = 1e-6;    // relative error wanted in every output (max over time / max of the output)
+  double duration = 10;       // [s]
+  double output_step = 0.01;  // [s]
+  /// As in IntegratorOptions: below this part of its largest rate a hinge on its stop has settled. Negative: tolerance
+  /// / 100. Zero: never.
+  double settle = -1;
+  std::string linear_solver = "klu";  // or "dense"
+  long max_steps = 200'000'000;
+  const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
+  std::function<void(double time, double duration)> progress;  // called now and then
+};
+
+/// A crossing of the stop of a joint.
+struct StopEvent {
+  double time = 0;      // [s]
+  int joint = 0;        // index into Multibody::joints
+  bool contact = true;  // true: touches the stop, false: leaves it
+  double rate = 0;      // [rad/s] or [m/s]
+};
+
+struct MultipliersSummary {
+  long steps = 0, residual_evaluations = 0, factorisations = 0, newton_iterations = 0, error_test_failures = 0,
+       convergence_failures = 0, restarts = 0;
+  double seconds = 0;
+  double position_drift = 0;           // largest violation of a constraint at any step [m]
+  double angle_drift = 0;              // [rad]
+  double velocity_drift = 0;           // of the constraints' rates [m/s]
+  double angular_velocity_drift = 0;   // [rad/s]
+  double quaternion_drift = 0;         // max | |p| - 1 |
+  double energy_balance = 0;           // max |E - E0 - supplied| / max E
+  double momentum_drift = 0;           // of both momenta, each over its scale; 0 where something holds or pushes
+  std::vector<std::string> redundant;  // constraint rows left out, by joint
+  std::vector<double> settled;         // per joint: time after which its stop was no longer looked at, or -1
+  bool interrupted = false;
+};
+
+struct MultibodyTrajectory {
+  std::vector<double> time;
+  std::vector<MultibodyState> states;
+  std::vector<Balance> balance;  // momenta with the wheels'; elastic with springs and gravity's potential
+  std::vector<StopEvent> events;
+  MultipliersSummary summary;
+};
+
+/// The equations of motion in redundant coordinates (eq. 12): every body has R, quaternion, q, velocity, omega, q_dot;
+/// joints are constraints with Lagrange multipliers (README, "Redundant coordinates"). Never changes after
+/// construction.
+class Multipliers {
+ public:
+  /// @throws InputError when a body, place or joint is not valid, naming it.
+  explicit Multipliers(Multibody);
+  ~Multipliers();
+  Multipliers(Multipliers&&) noexcept;
+
+  const Multibody& multibody() const;
+
+  struct Impl;
+  const Impl& impl() const { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The bodies where the joints of the tree put them, q = 0: for each joint its freedoms (hinge: angle [rad]; slider:
+/// way [m]; universal: two angles [rad]; spherical: rotation vector [rad]; free: way, then rotation vector, both in the
+/// axes of a), and their rates. An empty list of a joint is zeros. Joints that close loops are not looked at.
+/// @throws InputError when the joints are no tree or a list has the wrong size.
+std::vector<BodyState> place_bodies(const Multibody&, const std::vector<std::vector<double>>& coordinates,
+                                    const std::vector<std::vector<double>>& rates = {});
+
+/// Moves the bodies as little as needed (mass metric) until every joint closes at t = 0, positions and velocities.
+/// @throws InputError naming the joint that stays open.
+std::vector<BodyState> close_joints(const Multipliers&, std::vector<BodyState>);
+
+/// Flies the bodies from t = 0 with SUNDIALS IDA.
+/// @throws InputError when the start does not fulfil a joint (naming it) or the options are bad; NumericalError when
+/// the method fails or a loop locks, naming the joint.
+MultibodyTrajectory integrate_multipliers(const Multipliers&, const std::vector<BodyState>& start,
+                                          const MultipliersOptions&);
+
+}  // namespace flexboom

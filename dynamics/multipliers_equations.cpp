@@ -1,0 +1,296 @@
+#include "dynamics/multipliers_equations.hpp"
+
+#include "dynamics/multipliers_scratch.hpp"
+#include "dynamics/rotation.hpp"
+
+#include <algorithm>
+
+namespace flexboom::redundant {
+
+using Eigen::Index;
+using Eigen::Map;
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+using Eigen::VectorXd;
+using spatial::eigen;
+using spatial::vec3;
+
+Equations::Equations(const Prepared& prepared) : prepared_(prepared), scene_(prepared.scene), joints_(prepared.joints) {
+  for (const BodyData& b : prepared.bodies) {
+    const int n = static_cast<int>(b.n), o = motion_;
+    places_.push_back({o, o + 3, o + 7, o + 7 + n, o + 10 + n, o + 13 + n, n, 0, freedoms_});
+    motion_ += 13 + 2 * n;
+    freedoms_ += 6 + n;
+  }
+  wheels_ = motion_;
+  motion_ += static_cast<int>(scene_.wheels.size());
+  inverse_metric_.resize(freedoms_);
+  for (size_t i = 0; i < places_.size(); ++i) {
+    const BodyData& b = prepared.bodies[i];
+    const Index at = places_[i].freedom;
+    inverse_metric_.segment<3>(at).setConstant(1 / b.m);
+    inverse_metric_.segment<3>(at + 3).setConstant(3 / (b.J0.xx + b.J0.yy + b.J0.zz));
+    inverse_metric_.segment(at + 6, places_[i].n) = b.Me.diagonal().cwiseInverse();
+  }
+  for (const JointData& j : joints_) all_rows_ += static_cast<int>(j.rows.size());
+  keep_rows(std::vector<char>(static_cast<size_t>(all_rows_), 1));
+  scratch_ = std::make_unique<EquationScratch>(prepared.bodies);
+}
+
+Equations::~Equations() = default;
+
+void Equations::keep_rows(const std::vector<char>& kept) {
+  size_ = motion_;
+  size_t row = 0;
+  for (JointData& j : joints_)
+    for (Row& r : j.rows) {
+      r.kept = kept[row++];
+      r.lambda = r.kept ? size_++ : -1;
+      r.mu = r.kept ? size_++ : -1;
+    }
+  for (BodyPlaces& b : places_) b.nu = size_++;
+  supplied_ = size_++;
+}
+
+VectorXd Equations::pack(const std::vector<BodyState>& states) const {
+  VectorXd y = VectorXd::Zero(size_);
+  for (size_t i = 0; i < places_.size(); ++i) {
+    const BodyPlaces& at = places_[i];
+    const BodyState& s = states[i];
+    y.segment<3>(at.R) = s.position;
+    y.segment<4>(at.p) = s.attitude.normalized();
+    y.segment<3>(at.v) = s.velocity;
+    y.segment<3>(at.w) = s.omega;
+    if (s.q.size() > 0) y.segment(at.q, at.n) = s.q;
+    if (s.q_dot.size() > 0) y.segment(at.u, at.n) = s.q_dot;
+  }
+  for (size_t i = 0; i < scene_.wheels.size(); ++i) {
+    const ReactionWheel& w = scene_.wheels[i];
+    y[wheel(i)] = w.inertia * (w.spin + w.axis.dot(states[static_cast<size_t>(w.body)].omega));
+  }
+  return y;
+}
+
+std::vector<BodyState> Equations::unpack(const double* y) const {
+  std::vector<BodyState> states;
+  for (const BodyPlaces& at : places_) {
+    BodyState s;
+    s.position = Map<const Vector3d>(y + at.R);
+    s.attitude = Map<const Vector4d>(y + at.p);
+    s.velocity = Map<const Vector3d>(y + at.v);
+    s.omega = Map<const Vector3d>(y + at.w);
+    s.q = Map<const VectorXd>(y + at.q, at.n);
+    s.q_dot = Map<const VectorXd>(y + at.u, at.n);
+    states.push_back(std::move(s));
+  }
+  return states;
+}
+
+Frame<double> Equations::frame(int body, const double* y) const {
+  Frame<double> f;
+  f.A.row = {Vec3<double>{1, 0, 0}, Vec3<double>{0, 1, 0}, Vec3<double>{0, 0, 1}};
+  if (body < 0) return f;
+  const BodyPlaces& at = places_[static_cast<size_t>(body)];
+  f.R = three(y + at.R), f.v = three(y + at.v), f.w = three(y + at.w);
+  f.A = rotation(y + at.p);
+  return f;
+}
+
+Elastic<double> Equations::elastic(const PlaceData& p, const double* y) const {
+  Elastic<double> e;
+  if (!p.flexible) return e;
+  const BodyPlaces& at = places_[static_cast<size_t>(p.body)];
+  for (Index k = 0; k < at.n; ++k) {
+    const double q = y[at.q + k], u = y[at.u + k];
+    const Vec3<double> S = three(p.S.col(k).data()), T = three(p.S_theta.col(k).data());
+    e.s += q * S, e.phi += q * T, e.s_dot += u * S, e.phi_dot += u * T;
+  }
+  return e;
+}
+
+PairMotion<double> Equations::pair(const JointData& j, double t, const double* y, const Joint* joint) const {
+  PairMotion<double> x{frame(j.a.body, y), frame(j.b.body, y), elastic(j.a, y), elastic(j.b, y), {}};
+  if (joint != nullptr)
+    for (size_t i = 0; i < joint->prescribed.size(); ++i)
+      x.drive[i] = {joint->prescribed[i].value(t), joint->prescribed[i].rate(t)};
+  return x;
+}
+
+RowMultipliers Equations::multipliers(const JointData& j, const double* y) const {
+  RowMultipliers m;
+  for (size_t i = 0; i < j.rows.size(); ++i)
+    if (j.rows[i].kept) m.lambda[i] = y[j.rows[i].lambda], m.mu[i] = y[j.rows[i].mu];
+  return m;
+}
+
+void Equations::scatter(const PlaceData& p, const PlaceForce<double>& f, double* F) const {
+  if (p.body < 0) return;
+  const BodyPlaces& at = places_[static_cast<size_t>(p.body)];
+  subtract(f.R, F + at.v);
+  subtract(f.w, F + at.w);
+  if (!p.flexible) return;
+  for (Index k = 0; k < at.n; ++k)
+    F[at.u + k] -= dot(three(p.S.col(k).data()), f.s) + dot(three(p.S_theta.col(k).data()), f.phi);
+}
+
+/// The same in the kinematic rows, weighed with the inverse metric.
+void Equations::scatter_correction(const PlaceData& p, const PlaceForce<double>& f, const double* y, double* F) const {
+  if (p.body < 0) return;
+  const BodyPlaces& at = places_[static_cast<size_t>(p.body)];
+  const double* metric = inverse_metric_.data() + at.freedom;
+  subtract(metric[0] * f.R, F + at.R);
+  const std::array<double, 4> turn = half_product(y + at.p, metric[3] * f.w);
+  for (size_t k = 0; k < 4; ++k) F[at.p + static_cast<int>(k)] -= turn[k];
+  if (!p.flexible) return;
+  for (Index k = 0; k < at.n; ++k)
+    F[at.q + k] -= metric[6 + k] * (dot(three(p.S.col(k).data()), f.s) + dot(three(p.S_theta.col(k).data()), f.phi));
+}
+
+void Equations::body_residual(size_t i, const double* y, const double* y_dot, double* F) {
+  const BodyPlaces& at = places_[i];
+  const double *p = y + at.p, nu = y[at.nu];
+  for (int k = 0; k < 3; ++k) F[at.R + k] += y_dot[at.R + k] - y[at.v + k];
+  const std::array<double, 4> turn = half_product(p, three(y + at.w));
+  for (int k = 0; k < 4; ++k) F[at.p + k] += y_dot[at.p + k] - turn[static_cast<size_t>(k)] - nu * p[k];
+  for (int k = 0; k < at.n; ++k) F[at.q + k] += y_dot[at.q + k] - y[at.u + k];
+  F[at.nu] = 0.5 * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3] - 1);
+
+  BodyInput<double> x{
+      rotation(p),         three(y + at.w), y + at.q, y + at.u, three(y_dot + at.v) - vec3(scene_.gravity),
+      three(y_dot + at.w), y_dot + at.u};
+  Vec3<double> on_R, on_w;
+  body_forces(prepared_.bodies[i], x, scratch_->bodies[i].Cr, on_R, on_w, scratch_->bodies[i].on_q.data());
+  subtract(-on_R, F + at.v);
+  subtract(-on_w, F + at.w);
+  for (int k = 0; k < at.n; ++k) F[at.u + k] += scratch_->bodies[i].on_q[static_cast<size_t>(k)];
+}
+
+void Equations::residual(double t, const double* y, const double* y_dot, const JointMemory& memory, double* F) {
+  std::fill(F, F + size_, 0.0);
+  double power = 0;
+  for (size_t i = 0; i < places_.size(); ++i) body_residual(i, y, y_dot, F);
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    const JointData& j = joints_[i];
+    if (j.rows.empty() && !j.mechanism) continue;
+    const Joint& joint = scene_.joints[i];
+    const PairMotion<double> x = pair(j, t, y, &joint);
+    const PlaceMotion<double> a = place_motion(j.a, x.frame_a, x.elastic_a),
+                              b = place_motion(j.b, x.frame_b, x.elastic_b);
+    PairForces<double> forces, correction;
+    std::array<double, 6> g{}, g_dot{};
+    constrain(j, x, a, b, multipliers(j, y), g.data(), g_dot.data(), forces, &correction, power);
+    if (j.mechanism)
+      act_mechanism(j, joint.mechanism, joint.kind == JointKind::hinge, memory.closed[i], memory.near[i], x, a, b,
+                    forces, power);
+    for (size_t k = 0; k < j.rows.size(); ++k)
+      if (j.rows[k].kept) F[j.rows[k].mu] = g[k], F[j.rows[k].lambda] = g_dot[k];
+    scatter(j.a, forces.a, F);
+    scatter(j.b, forces.b, F);
+    scatter_correction(j.a, correction.a, y, F);
+    scatter_correction(j.b, correction.b, y, F);
+  }
+  for (size_t i = 0; i < scene_.springs.size(); ++i) {
+    const JointData& j = prepared_.springs[i];
+    const PairMotion<double> x = pair(j, t, y, nullptr);
+    PairForces<double> forces;
+    act_spring(j, scene_.springs[i], x, place_motion(j.a, x.frame_a, x.elastic_a),
+               place_motion(j.b, x.frame_b, x.elastic_b), forces, power);
+    scatter(j.a, forces.a, F);
+    scatter(j.b, forces.b, F);
+  }
+  for (size_t i = 0; i < scene_.loads.size(); ++i) {
+    const PlaceData& p = prepared_.loads[i];
+    const Frame<double> f = frame(p.body, y);
+    const PlaceMotion<double> m = place_motion(p, f, elastic(p, y));
+    const auto [force, torque] = load_at(scene_.loads[i], m, t);
+    PlaceForce<double> forces;
+    add_force(p, f, m, force, torque, forces);
+    scatter(p, forces, F);
+    power += dot(force, m.r_dot) + dot(torque, m.omega);
+  }
+  for (size_t i = 0; i < scene_.wheels.size(); ++i) {
+    const ReactionWheel& wheel_i = scene_.wheels[i];
+    const BodyPlaces& at = places_[static_cast<size_t>(wheel_i.body)];
+    const double torque = wheel_i.torque ? wheel_i.torque(t) : 0.0, h = y[wheel(i)];
+    const Vec3<double> axis = vec3(wheel_i.axis), w = three(y + at.w);
+    F[wheel(i)] = y_dot[wheel(i)] - torque;
+    subtract(-(torque * axis + cross(w, h * axis)), F + at.w);
+    power += torque * (h / wheel_i.inertia - dot(axis, w));
+  }
+  for (size_t i = 0; i < prepared_.bodies.size(); ++i) {
+    const BodyPlaces& at = places_[i];
+    if (at.n == 0) continue;
+    const Map<const VectorXd> u(y + at.u, at.n);
+    power -= u.dot(prepared_.bodies[i].De.lazyProduct(u));
+  }
+  F[supplied_] = y_dot[supplied_] - power;
+}
+
+void Equations::row_violations(double t, const double* y, double* g, double* g_dot) const {
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    const JointData& j = joints_[i];
+    if (j.rows.empty()) continue;
+    const PairMotion<double> x = pair(j, t, y, &scene_.joints[i]);
+    PairForces<double> unused;
+    double power = 0;
+    constrain(j, x, place_motion(j.a, x.frame_a, x.elastic_a), place_motion(j.b, x.frame_b, x.elastic_b),
+              RowMultipliers{}, g, g_dot, unused, nullptr, power);
+    g += j.rows.size(), g_dot += j.rows.size();
+  }
+}
+
+DriveMotion<double> Equations::gap(size_t i, const double* y, double near) const {
+  const JointData& j = joints_[i];
+  const PairMotion<double> x = pair(j, 0, y, nullptr);
+  return joint_gap(scene_.joints[i].kind == JointKind::hinge, scene_.joints[i].mechanism.threshold,
+                   place_motion(j.a, x.frame_a, x.elastic_a), place_motion(j.b, x.frame_b, x.elastic_b), near);
+}
+
+std::vector<JointReaction> Equations::loads(double t, const double* y) {
+  std::vector<JointReaction> loads(joints_.size());
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    const JointData& j = joints_[i];
+    const PairMotion<double> x = pair(j, t, y, &scene_.joints[i]);
+    const PlaceMotion<double> a = place_motion(j.a, x.frame_a, x.elastic_a),
+                              b = place_motion(j.b, x.frame_b, x.elastic_b);
+    Vec3<double> force, torque;
+    for (const Row& row : j.rows) {
+      if (!row.kept) continue;
+      const RowVectors<double> v = row_vectors(row, a, b, x.drive);
+      if (row.kind == Row::Kind::along)
+        force += y[row.lambda] * v.e;
+      else
+        torque += y[row.lambda] * cross(v.f, v.e);
+    }
+    loads[i] = {eigen(transposed_product(a.axes, force)), eigen(transposed_product(a.axes, torque))};
+  }
+  return loads;
+}
+
+double Equations::potential(const double* y, const JointMemory& memory) const {
+  double energy = 0;
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    if (!joints_[i].mechanism) continue;
+    const HingeMechanism& m = scene_.joints[i].mechanism;
+    const double depth = gap(i, y, memory.near[i]).value, stretch = depth + (m.threshold - m.rest);
+    energy += 0.5 * m.stiffness * stretch * stretch + 0.5 * m.stop_stiffness * std::pow(std::max(0.0, depth), 2);
+  }
+  for (size_t i = 0; i < scene_.springs.size(); ++i) {
+    const JointData& j = prepared_.springs[i];
+    const PairMotion<double> x = pair(j, 0, y, nullptr);
+    const Vec3<double> d = place_motion(j.b, x.frame_b, x.elastic_b).r - place_motion(j.a, x.frame_a, x.elastic_a).r;
+    const double stretch = std::sqrt(dot(d, d)) - scene_.springs[i].free_length;
+    energy += 0.5 * scene_.springs[i].stiffness * stretch * stretch;
+  }
+  for (size_t i = 0; i < places_.size(); ++i) {
+    const BodyPlaces& at = places_[i];
+    const ReducedBody& body = scene_.bodies[i];
+    const Map<const VectorXd> q(y + at.q, at.n);
+    Vector3d mc = body.mc0;
+    if (at.n > 0) mc += body.Ct * q, energy += 0.5 * q.dot(body.Ke * q);
+    energy -= scene_.gravity.dot(body.m * Map<const Vector3d>(y + at.R) + eigen(rotation(y + at.p) * vec3(mc)));
+  }
+  return energy;
+}
+
+}  // namespace flexboom::redundant

@@ -1,0 +1,152 @@
+#pragma once
+
+// The residual of eq. 12 with stabilised constraints, its Newton matrix, and what a start needs. Internal to the
+// redundant coordinates.
+
+#include "dynamics/multipliers.hpp"
+#include "dynamics/multipliers_body.hpp"
+#include "dynamics/multipliers_joint.hpp"
+
+#include <Eigen/Core>
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace flexboom::redundant {
+
+/// The same description made ready.
+struct Prepared {
+  Multibody scene;
+  std::vector<BodyData> bodies;
+  std::vector<JointData> joints, springs;
+  std::vector<PlaceData> loads;
+};
+
+/// Sums what is added, always in the same order, into the values of a matrix with a fixed pattern.
+class Assembly {
+ public:
+  /// While recording, collects the pattern; `finish` sorts it by columns.
+  void add(int row, int column, double value) {
+    if (recording_)
+      places_.emplace_back(row, column);
+    else
+      values_[slots_[next_++]] += value;
+  }
+  template <class M>
+  void add_block(int row, int column, const M& block) {
+    for (Eigen::Index j = 0; j < block.cols(); ++j)
+      for (Eigen::Index i = 0; i < block.rows(); ++i)
+        add(row + static_cast<int>(i), column + static_cast<int>(j), block(i, j));
+  }
+  void finish(int size, bool dense);
+  /// Starts over in these values.
+  void begin(double* values);
+
+  const std::vector<int>& starts() const { return starts_; }  // columns of the sparse matrix
+  const std::vector<int>& rows() const { return rows_; }
+
+ private:
+  bool recording_ = true;
+  std::vector<std::pair<int, int>> places_;
+  std::vector<size_t> slots_;
+  std::vector<int> starts_, rows_;
+  size_t next_ = 0, count_ = 0;
+  double* values_ = nullptr;
+};
+
+/// Places of a body's unknowns in y, [R p q v w u]; of its freedoms [R theta q].
+struct BodyPlaces {
+  int R = 0, p = 0, q = 0, v = 0, w = 0, u = 0, n = 0, nu = 0, freedom = 0;
+};
+
+/// State of the events: which stops are closed; the gaps (angle less threshold) near which hinges are.
+struct JointMemory {
+  std::vector<char> closed;
+  std::vector<double> near;
+};
+
+struct EquationScratch;
+
+class Equations {
+ public:
+  explicit Equations(const Prepared&);
+  ~Equations();
+  Equations(const Equations&) = delete;
+  Equations& operator=(const Equations&) = delete;
+
+  const Multibody& scene() const { return scene_; }
+  const std::vector<JointData>& joints() const { return joints_; }
+  const std::vector<BodyPlaces>& places() const { return places_; }
+  int size() const { return size_; }                                   // of y
+  int motion() const { return motion_; }                               // y begins with this much of bodies and wheels
+  int wheel(size_t i) const { return wheels_ + static_cast<int>(i); }  // axial angular momentum [N m s]
+  int supplied() const { return supplied_; }
+  int freedoms() const { return freedoms_; }
+  int all_rows() const { return all_rows_; }  // kept or not
+
+  /// Keeps these rows (one flag per row of all joints) and numbers the unknowns anew.
+  void keep_rows(const std::vector<char>&);
+
+  Eigen::VectorXd pack(const std::vector<BodyState>&) const;
+  std::vector<BodyState> unpack(const double* y) const;
+
+  /// F(t, y, y_dot) = 0. Allocates nothing.
+  void residual(double t, const double* y, const double* y_dot, const JointMemory&, double* F);
+  /// dF/dy + c dF/dy_dot.
+  void newton(double t, double c, const double* y, const double* y_dot, const JointMemory&, Assembly&);
+
+  /// Values, rates of all rows, and the part of their second derivative that is no acceleration's.
+  struct RowValues {
+    Eigen::VectorXd g, g_dot, bias;
+  };
+  void row_values(double t, const double* y, RowValues&);
+  /// Values and rates alone, without allocation.
+  void row_violations(double t, const double* y, double* g, double* g_dot) const;
+  /// Gradient of all rows over the freedoms, all_rows x freedoms.
+  Eigen::MatrixXd gradient(double t, const double* y);
+  /// Mass matrix of a body over its freedoms.
+  Eigen::MatrixXd mass(size_t body, const double* y) const;
+  /// y_dot and the multipliers in y, consistent with the motion in y (mu and nu zero).
+  /// @throws NumericalError when the kept rows are not independent.
+  void make_consistent(double t, Eigen::VectorXd& y, Eigen::VectorXd& y_dot, const JointMemory&);
+  /// Moves y by freedoms dx (rotations in BRF axes) and changes velocities by dv.
+  void displace(Eigen::VectorXd& y, const Eigen::VectorXd& dx) const;
+  void accelerate(Eigen::VectorXd& y, const Eigen::VectorXd& dv) const;
+  /// Brings the kept rows and their rates to zero (Newton, least motion in the mass metric); the largest step.
+  double project(double t, Eigen::VectorXd& y);
+  /// Inverse of a rough, constant, diagonal mass matrix over the freedoms.
+  const Eigen::VectorXd& inverse_metric() const { return inverse_metric_; }
+
+  /// Angle or way of a joint less its threshold: keeps its digits near the stop.
+  DriveMotion<double> gap(size_t joint, const double* y, double near) const;
+  std::vector<JointReaction> loads(double t, const double* y);
+  /// Potential energy of mechanisms, springs, bodies and gravity.
+  double potential(const double* y, const JointMemory&) const;
+  /// Motion of the two places of a joint at time t.
+  PairMotion<double> pair(const JointData&, double t, const double* y, const Joint*) const;
+
+ private:
+  Frame<double> frame(int body, const double* y) const;
+  Elastic<double> elastic(const PlaceData&, const double* y) const;
+  void scatter(const PlaceData&, const PlaceForce<double>&, double* F) const;
+  void scatter_correction(const PlaceData&, const PlaceForce<double>&, const double* y, double* F) const;
+  RowMultipliers multipliers(const JointData&, const double* y) const;
+  void body_residual(size_t i, const double* y, const double* y_dot, double* F);
+  void body_newton(size_t i, double t, double c, const double* y, const double* y_dot, Assembly&);
+  void pair_newton(const JointData&, const Eigen::MatrixXd& derivatives, bool velocities, const double* y, Assembly&);
+
+  const Prepared& prepared_;
+  const Multibody& scene_;
+  std::vector<JointData> joints_;
+  std::vector<BodyPlaces> places_;
+  int size_ = 0, motion_ = 0, wheels_ = 0, supplied_ = 0, freedoms_ = 0, all_rows_ = 0;
+  Eigen::VectorXd inverse_metric_;
+  std::unique_ptr<EquationScratch> scratch_;
+};
+
+}  // namespace flexboom::redundant
+
+namespace flexboom {
+struct Multipliers::Impl : redundant::Prepared {};
+}  // namespace flexboom

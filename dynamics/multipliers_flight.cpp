@@ -1,0 +1,441 @@
+#include "dynamics/crossing.hpp"
+#include "dynamics/ida.hpp"
+#include "dynamics/multipliers.hpp"
+#include "dynamics/multipliers_scales.hpp"
+#include "dynamics/multipliers_start.hpp"
+#include "dynamics/rotation.hpp"
+#include "fem/check.hpp"
+#include "fem/stopwatch.hpp"
+#include "reduction/root_loads.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using namespace redundant;
+
+namespace {
+
+/// Part of the tolerance wanted over a run that each step is asked for.
+constexpr double local_share = 0.02;
+/// A violation of a joint at the start beyond this [m, rad, their rates] is the caller's mistake.
+constexpr double open_joint = 1e-8;
+
+void check_options(const MultipliersOptions& o) {
+  require(o.tolerance > 0 && o.tolerance <= 0.1, fmt::format("tolerance {:g} must lie in (0, 0.1]", o.tolerance));
+  require(o.duration > 0 && std::isfinite(o.duration), fmt::format("duration {:g} s must be positive", o.duration));
+  require(o.output_step > 0, fmt::format("output step {:g} s must be positive", o.output_step));
+  require(o.duration / o.output_step <= 1e6,
+          fmt::format("{:.3g} output times are too many; choose a longer output step", o.duration / o.output_step));
+}
+
+/// One run: the events around IDA.
+class MultipliersFlight final : public DaeProblem {
+ public:
+  MultipliersFlight(const Multipliers& system, const std::vector<BodyState>& start, const MultipliersOptions& options)
+      : equations_(system.impl()),
+        scene_(system.multibody()),
+        options_(options),
+        settle_(options.settle < 0 ? options.tolerance / 100 : options.settle) {
+    const size_t joints = scene_.joints.size();
+    memory_ = {std::vector<char>(joints, 0), std::vector<double>(joints, 0.0)};
+    largest_rate_.assign(joints, 0);
+    largest_gap_.assign(joints, 0);
+    result_.summary.settled.assign(joints, -1);
+    for (size_t i = 0; i < joints; ++i)
+      if (equations_.joints()[i].stop) stops_.push_back(i);
+    armed_.assign(stops_.size(), 1);
+    crossed_.assign(stops_.size(), 0);
+    start_on_constraints(start);
+    begin_contacts();
+    equations_.make_consistent(0, y_, y_dot_, memory_);
+    const Balance b = balance_of(y_);
+    scales_ = std::make_unique<StateScales>(equations_, y_, y_dot_, std::abs(b.kinetic) + std::abs(b.elastic),
+                                            local_share * options.tolerance, options.duration);
+    record_pattern();
+    ida_ = std::make_unique<Ida>(*this, options.linear_solver);
+  }
+
+  MultibodyTrajectory fly() {
+    const Stopwatch watch;
+    record(0, y_);
+    ida_->restart(0, y_, y_dot_);
+    while (t_ < options_.duration && !stopped()) advance();
+    if (result_.summary.interrupted && result_.time.back() < t_) record(t_, y_);
+    finish(watch.seconds());
+    return std::move(result_);
+  }
+
+  int size() const override { return equations_.size(); }
+  VectorXd differential() const override {
+    VectorXd id = VectorXd::Zero(size());
+    id.head(equations_.motion()).setOnes();
+    id[equations_.supplied()] = 1;
+    return id;
+  }
+  void residual(double t, const double* y, const double* y_dot, double* F) override {
+    equations_.residual(t, y, y_dot, memory_, F);
+  }
+  void newton_matrix(double t, double c, const double* y, const double* y_dot, double* values) override {
+    assembly_.begin(values);
+    equations_.newton(t, c, y, y_dot, memory_, assembly_);
+  }
+  std::span<const int> column_starts() const override { return assembly_.starts(); }
+  std::span<const int> rows() const override { return assembly_.rows(); }
+  void weights(double* w) const override { scales_->weights(w); }
+  int roots() const override { return static_cast<int>(stops_.size()); }
+  void root_values(double, const double* y, double* values) override {
+    // Round-off of a gap must not look like a crossing: it counts as on the side of the flag.
+    constexpr double round_off = 2e-16;
+    for (size_t i = 0; i < stops_.size(); ++i) {
+      const double g = gap(i, y).value;
+      const double side = memory_.closed[stops_[i]] ? round_off : -round_off;
+      values[i] = !armed_[i] ? 1.0 : std::abs(g) <= round_off ? side : g;
+    }
+  }
+
+ private:
+  DriveMotion<double> gap(size_t stop, const double* y) {
+    return equations_.gap(stops_[stop], y, memory_.near[stops_[stop]]);
+  }
+
+  void start_on_constraints(const std::vector<BodyState>& start) {
+    require(start.size() == scene_.bodies.size(),
+            fmt::format("{} bodies need as many states, {} were given", scene_.bodies.size(), start.size()));
+    for (size_t i = 0; i < start.size(); ++i)
+      for (const VectorXd* q : {&start[i].q, &start[i].q_dot})
+        require(q->size() == 0 || q->size() == scene_.bodies[i].n(),
+                fmt::format("body \"{}\" has {} elastic coordinates, {} were given", scene_.bodies[i].name,
+                            scene_.bodies[i].n(), q->size()));
+    y_ = equations_.pack(start);
+    require(y_.allFinite(), "the start state is not finite");
+    Equations::RowValues values;
+    equations_.row_values(0, y_.data(), values);
+    require_closed(violation(equations_, values.g), "m", "rad", "is open by");
+    check_branches(equations_, 0, y_.data());
+    const RankReport rank = constraint_rank(equations_, 0, y_.data());
+    for (const RowName& n : rank.left_out) result_.summary.redundant.push_back(describe(equations_, n));
+    margin_ = rank.margin;
+    equations_.keep_rows(rank.kept);
+    y_ = equations_.pack(start);
+    equations_.project(0, y_);
+    equations_.row_values(0, y_.data(), values);
+    require_closed(violation(equations_, values.g_dot), "m/s", "rad/s",
+                   "can not follow: its motion is prescribed against other joints', by");
+    rows_ = rates_ = VectorXd::Zero(equations_.all_rows());
+  }
+
+  void require_closed(const Violation& v, const char* metres, const char* radians, const char* what) const {
+    const bool place = v.position > open_joint;
+    if (!place && !(v.angle > open_joint)) return;
+    throw InputError(fmt::format("{}: it {} {:.3g} {} at the start; see close_joints",
+                                 describe(equations_, place ? v.worst_position : v.worst_angle), what,
+                                 place ? v.position : v.angle, place ? metres : radians));
+  }
+
+  /// Angles near what the mechanism wants, stops closed beyond their threshold; on it by where the joint goes.
+  void begin_contacts() {
+    for (size_t i = 0; i < scene_.joints.size(); ++i) {
+      const HingeMechanism& m = scene_.joints[i].mechanism;
+      memory_.near[i] = m.rest - m.threshold;
+    }
+    follow_turns();
+    VectorXd y = y_;
+    equations_.make_consistent(0, y, y_dot_, memory_);
+    for (size_t i = 0; i < stops_.size(); ++i) {
+      const DriveMotion<double> g = gap(i, y_.data());
+      const double push = rate_of_rate(i, y);
+      const bool on = std::abs(g.value) < 4e-16;
+      memory_.closed[stops_[i]] = on ? g.rate > 0 || (g.rate == 0 && push > 0) : g.value > 0;
+    }
+  }
+
+  /// Second derivative of a joint's coordinate at y, y_dot_, by the change over a short time.
+  double rate_of_rate(size_t stop, const VectorXd& y) {
+    constexpr double h = 1e-7;
+    const double before = gap(stop, (y - h * y_dot_).eval().data()).rate,
+                 after = gap(stop, (y + h * y_dot_).eval().data()).rate;
+    return (after - before) / (2 * h);
+  }
+
+  void follow_turns() {
+    for (size_t i = 0; i < scene_.joints.size(); ++i)
+      if (scene_.joints[i].kind == JointKind::hinge)
+        memory_.near[i] = equations_.gap(i, y_.data(), memory_.near[i]).value;
+  }
+
+  void record_pattern() {
+    equations_.newton(0, 1, y_.data(), y_dot_.data(), memory_, assembly_);
+    assembly_.finish(size(), options_.linear_solver == "dense");
+  }
+
+  bool stopped() {
+    const bool stop = options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed);
+    result_.summary.interrupted = result_.summary.interrupted || stop;
+    return stop;
+  }
+
+  void advance() {
+    const double t0 = t_;
+    before_.resize(stops_.size());
+    for (size_t i = 0; i < stops_.size(); ++i) before_[i] = clearance(i, y_);
+    try {
+      ida_->step(options_.duration, t_, y_, crossed_);
+    } catch (const NumericalError& error) {
+      if (constraint_rank(equations_, t_, y_.data()).margin < 3e-2 * margin_) throw_locked();
+      throw;
+    }
+    if (++steps_ > options_.max_steps)
+      throw NumericalError(
+          fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t_, options_.duration));
+    if (!y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", t_));
+    if (std::all_of(crossed_.begin(), crossed_.end(), [](int c) { return c == 0; })) find_short_contacts(t0);
+    write_outputs();
+    scales_->observe(y_);
+    follow_turns();
+    watch_constraints();
+    if (switch_contacts()) {
+      equations_.project(t_, y_);
+      equations_.make_consistent(t_, y_, y_dot_, memory_);
+      ida_->restart(t_, y_, y_dot_);
+      ++result_.summary.restarts;
+    }
+    if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
+  }
+
+  [[noreturn]] void throw_locked() {
+    throw NumericalError(fmt::format("joint \"{}\" locks at t = {:.6g} s: the joints leave no consistent velocity",
+                                     locked_joint(equations_, t_, y_.data()), t_));
+  }
+
+  /// Drift, rows that were left out, and whether the constraints are still independent.
+  void watch_constraints() {
+    equations_.row_violations(t_, y_.data(), rows_.data(), rates_.data());
+    const Violation g = violation(equations_, rows_), g_dot = violation(equations_, rates_);
+    MultipliersSummary& s = result_.summary;
+    s.position_drift = std::max(s.position_drift, g.position);
+    s.angle_drift = std::max(s.angle_drift, g.angle);
+    s.velocity_drift = std::max(s.velocity_drift, g_dot.position);
+    s.angular_velocity_drift = std::max(s.angular_velocity_drift, g_dot.angle);
+    for (const BodyPlaces& at : equations_.places())
+      s.quaternion_drift = std::max(s.quaternion_drift, std::abs(y_.segment<4>(at.p).norm() - 1));
+    if (std::max(g.position, g.angle) > 1e-6 + options_.tolerance) {
+      const RowName worst = g.position > g.angle ? g.worst_position : g.worst_angle;
+      throw NumericalError(fmt::format(
+          "{}: violated by {:.3g} at t = {:.6g} s; it depended on other joints at the start and does so no more",
+          describe(equations_, worst), std::max(g.position, g.angle), t_));
+    }
+    if (steps_ % 16 == 0 && constraint_rank(equations_, t_, y_.data()).margin < 1e-7 * margin_) throw_locked();
+  }
+
+  Clearance clearance(size_t i, const VectorXd& y) {
+    const double side = memory_.closed[stops_[i]] ? 1 : -1;
+    const DriveMotion<double> g = gap(i, y.data());
+    return {0, side * g.value, side * g.rate};
+  }
+
+  /// IDA looks at the signs at both ends of a step: a contact that begins and ends within it is found here.
+  void find_short_contacts(double t0) {
+    const double length = t_ - t0;
+    double first = length;
+    for (size_t i = 0; i < stops_.size(); ++i) {
+      if (!armed_[i] || !(before_[i].slope < 0)) continue;
+      Clearance to = clearance(i, y_);
+      to.c = length;
+      if (!(to.slope > 0) || to.value < 0) continue;
+      const auto at = [&](double c) {
+        sample_.resize(size());
+        ida_->interpolate(t0 + c, sample_);
+        Clearance here = clearance(i, sample_);
+        here.c = c;
+        return here;
+      };
+      const double root = crossing_between(at, before_[i], to, 4e-16 * t_);
+      if (root >= first) continue;
+      std::fill(crossed_.begin(), crossed_.end(), 0);
+      crossed_[i] = memory_.closed[stops_[i]] ? -1 : 1;
+      first = root;
+    }
+    if (first == length) return;
+    t_ = t0 + first;
+    ida_->interpolate(t_, y_);
+  }
+
+  bool switch_contacts() {
+    bool changed = false;
+    for (size_t i = 0; i < stops_.size(); ++i) {
+      const size_t joint = stops_[i];
+      const DriveMotion<double> g = gap(i, y_.data());
+      double &largest = largest_rate_[joint], &reach = largest_gap_[joint];
+      largest = std::max(largest, std::abs(g.rate));
+      reach = std::max(reach, std::abs(g.value));
+      const double noise = options_.tolerance * reach;
+      const bool closed = memory_.closed[joint];
+      const bool slipped = armed_[i] && crossed_[i] == 0 && (closed ? g.value < -noise : g.value > noise);
+      // Only a crossing away from where the flag is counts: the state may lie a rounding error behind the stop.
+      if ((crossed_[i] != 0 && (closed ? g.rate < 0 : g.rate > 0)) || slipped) {
+        memory_.closed[joint] = !closed;
+        result_.events.push_back({t_, static_cast<int>(joint), !closed, g.rate});
+        changed = true;
+        if (std::abs(g.rate) < settle_ * largest && !pushed(i)) {
+          result_.summary.settled[joint] = t_;
+          armed_[i] = 0;
+          memory_.closed[joint] = 0;
+        }
+      } else if (!armed_[i] && std::abs(g.rate) > 2 * settle_ * largest) {
+        result_.summary.settled[joint] = -1;
+        armed_[i] = 1;
+        memory_.closed[joint] = g.value > 0;
+        changed = true;
+      }
+    }
+    return changed;
+  }
+
+  /// Does something push a joint that is on its stop, so that it will not stay there?
+  bool pushed(size_t i) {
+    VectorXd y = y_;
+    equations_.make_consistent(t_, y, y_dot_, memory_);
+    const Joint& joint = scene_.joints[stops_[i]];
+    const ReducedBody& body = scene_.bodies[static_cast<size_t>(std::max(joint.b.body, 0))];
+    const double inertia = joint.kind == JointKind::hinge ? body.J0.trace() / 3 : body.m;
+    const double period = std::sqrt(inertia / (joint.mechanism.stiffness + joint.mechanism.stop_stiffness));
+    return std::abs(rate_of_rate(i, y)) * period > 2 * settle_ * largest_rate_[stops_[i]];
+  }
+
+  void write_outputs() {
+    for (double next = output_time(); next <= t_ && !stopped(); next = output_time()) {
+      if (next == t_) {
+        record(next, y_);
+      } else {
+        sample_.resize(size());
+        ida_->interpolate(next, sample_);
+        record(next, sample_);
+      }
+    }
+  }
+
+  double output_time() const {
+    const double next = static_cast<double>(result_.time.size()) * options_.output_step;
+    if (next <= options_.duration * (1 + 1e-12)) return std::min(next, options_.duration);
+    return result_.time.back() < options_.duration ? options_.duration : 2 * options_.duration;
+  }
+
+  /// Multipliers of an output are those of its motion, not interpolated.
+  void record(double t, VectorXd y) {
+    VectorXd y_dot;
+    equations_.make_consistent(t, y, y_dot, memory_);
+    MultibodyState s;
+    s.bodies = equations_.unpack(y.data());
+    for (size_t i = 0; i < scene_.joints.size(); ++i) {
+      const JointKind kind = scene_.joints[i].kind;
+      DriveMotion<double> c;
+      if (kind == JointKind::hinge || kind == JointKind::slider) c = equations_.gap(i, y.data(), memory_.near[i]);
+      s.coordinate.push_back(c.value + scene_.joints[i].mechanism.threshold);
+      s.rate.push_back(c.rate);
+    }
+    s.loads = equations_.loads(t, y.data());
+    for (size_t i = 0; i < scene_.wheels.size(); ++i) {
+      const ReactionWheel& w = scene_.wheels[i];
+      s.spin.push_back(y[equations_.wheel(i)] / w.inertia - w.axis.dot(s.bodies[static_cast<size_t>(w.body)].omega));
+    }
+    s.supplied = y[equations_.supplied()];
+    result_.time.push_back(t);
+    result_.states.push_back(std::move(s));
+    result_.balance.push_back(balance_of(y));
+  }
+
+  Balance balance_of(const VectorXd& y) {
+    Balance b;
+    double m = 0;
+    Vector3d first_moment = Vector3d::Zero();
+    const std::vector<BodyState> states = equations_.unpack(y.data());
+    for (size_t i = 0; i < states.size(); ++i) {
+      const BodyState& s = states[i];
+      const ReducedBody& body = scene_.bodies[i];
+      const Matrix3d A = rotation_matrix(s.attitude);
+      BodyMomenta of = momenta(body, {.v = A.transpose() * s.velocity, .omega = s.omega, .q = s.q, .q_dot = s.q_dot});
+      for (size_t k = 0; k < scene_.wheels.size(); ++k) {
+        const ReactionWheel& w = scene_.wheels[k];
+        if (w.body != static_cast<int>(i)) continue;
+        const double h = y[equations_.wheel(k)];
+        of.angular += h * w.axis;
+        of.kinetic += h * h / (2 * w.inertia);
+      }
+      const Vector3d P = A * of.linear, H = A * of.angular;
+      b.kinetic += of.kinetic;
+      b.momentum += P;
+      b.momentum_scale += P.norm();
+      b.angular_momentum += H + s.position.cross(P);
+      b.angular_momentum_scale += H.norm();
+      m += body.m;
+      first_moment += body.m * s.position + A * (body.mc0 + body.Ct * s.q);
+    }
+    b.angular_momentum -= (first_moment / m).cross(b.momentum);
+    b.elastic = equations_.potential(y.data(), memory_);
+    return b;
+  }
+
+  bool isolated() const {
+    if (!scene_.loads.empty() || !scene_.gravity.isZero(0)) return false;
+    for (const Joint& j : scene_.joints)
+      if (j.kind != JointKind::free && (j.a.body < 0 || j.b.body < 0)) return false;
+    return std::none_of(scene_.springs.begin(), scene_.springs.end(),
+                        [](const SpringDamper& s) { return s.a.body < 0 || s.b.body < 0; });
+  }
+
+  void finish(double seconds) {
+    MultipliersSummary& s = result_.summary;
+    const DaeCounts c = ida_->counts();
+    s.steps = c.steps, s.residual_evaluations = c.residual_evaluations, s.factorisations = c.factorisations;
+    s.newton_iterations = c.newton_iterations, s.error_test_failures = c.error_test_failures;
+    s.convergence_failures = c.convergence_failures;
+    s.seconds = seconds;
+    const Balance& first = result_.balance.front();
+    double energy = 0, gap = 0, dP = 0, dH = 0, P = 0, H = 0;
+    for (size_t i = 0; i < result_.time.size(); ++i) {
+      const Balance& b = result_.balance[i];
+      energy = std::max(energy, std::abs(b.kinetic) + std::abs(b.elastic));
+      gap = std::max(gap, std::abs(b.kinetic + b.elastic - first.kinetic - first.elastic - result_.states[i].supplied));
+      dP = std::max(dP, (b.momentum - first.momentum).norm());
+      dH = std::max(dH, (b.angular_momentum - first.angular_momentum).norm());
+      P = std::max(P, b.momentum_scale);
+      H = std::max(H, b.angular_momentum_scale);
+    }
+    s.energy_balance = energy > 0 ? gap / energy : 0;
+    if (isolated()) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
+  }
+
+  Equations equations_;
+  const Multibody& scene_;
+  const MultipliersOptions& options_;
+  double settle_, margin_ = 1, t_ = 0;
+  JointMemory memory_;
+  std::vector<size_t> stops_;  // joints with a stop
+  std::vector<char> armed_;    // per stop
+  std::vector<int> crossed_;
+  std::vector<Clearance> before_;
+  std::vector<double> largest_rate_, largest_gap_;
+  VectorXd y_, y_dot_, sample_, rows_, rates_;
+  Assembly assembly_;
+  std::unique_ptr<StateScales> scales_;
+  std::unique_ptr<Ida> ida_;
+  long steps_ = 0;
+  MultibodyTrajectory result_;
+};
+
+}  // namespace
+
+MultibodyTrajectory integrate_multipliers(const Multipliers& system, const std::vector<BodyState>& start,
+                                          const MultipliersOptions& options) {
+  check_options(options);
+  return MultipliersFlight(system, start, options).fly();
+}
+
+}  // namespace flexboom

@@ -1,0 +1,82 @@
+#include "dynamics/multipliers_scales.hpp"
+
+#include "dynamics/rotation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace flexboom::redundant {
+
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+using Eigen::VectorXd;
+
+StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorXd& y0_dot, double energy,
+                         double tolerance, double duration)
+    : equations_(equations), tolerance_(tolerance), start_(y0) {
+  constexpr double part = 1e-3, round_off = 4e-15;
+  scale_ = VectorXd::Constant(y0.size(), 1e100);
+  least_ = VectorXd::Zero(y0.size());
+  const double time = std::min(1.0, 0.01 * duration), E = std::max(energy, 1e-30);
+  const auto& places = equations.places();
+  double length = 0;  // [m]: positions are known to round-off of this
+  for (const BodyPlaces& at : places) length = std::max(length, y0.segment<3>(at.R).norm());
+  for (const JointData& j : equations.joints())
+    for (const PlaceData* p : {&j.a, &j.b}) length = std::max(length, std::sqrt(dot(p->position, p->position)));
+  for (size_t i = 0; i < places.size(); ++i) {
+    const BodyPlaces& at = places[i];
+    const ReducedBody& b = equations.scene().bodies[i];
+    const auto speed = [&](int first, int count, double mass) {
+      return part * std::max({std::sqrt(2 * E / mass), y0_dot.segment(first, count).norm() * time,
+                              y0.segment(first, count).norm()});
+    };
+    const double v = speed(at.v, 3, b.m), w = speed(at.w, 3, b.J0.trace() / 3);
+    scale_.segment<3>(at.v).setConstant(v);
+    scale_.segment<3>(at.w).setConstant(w);
+    scale_.segment<3>(at.R).setConstant(v * time);
+    scale_.segment<4>(at.p).setConstant(std::min(part, w * time));
+    least_.segment<3>(at.R).setConstant(round_off * length);
+    least_.segment<4>(at.p).setConstant(round_off);
+    for (int k = 0; k < at.n; ++k) {
+      const double u = speed(at.u + k, 1, b.Me(k, k));
+      scale_[at.u + k] = u;
+      scale_[at.q + k] =
+          std::max(b.Ke(k, k) > 0 ? part * std::sqrt(2 * E / b.Ke(k, k)) : u * time, part * std::abs(y0[at.q + k]));
+    }
+  }
+  for (size_t i = 0; i < equations.scene().wheels.size(); ++i) {
+    const ReactionWheel& wheel = equations.scene().wheels[i];
+    scale_[equations.wheel(i)] =
+        std::max({part * std::sqrt(2 * E * wheel.inertia), std::abs(y0[equations.wheel(i)]), 1e-30});
+  }
+  scale_[equations.supplied()] = E;
+  observe(y0);
+}
+
+void StateScales::raise(int first, int count, double size) {
+  for (int k = 0; k < count; ++k) scale_[first + k] = std::max(scale_[first + k], size);
+}
+
+void StateScales::observe(const VectorXd& y) {
+  for (const BodyPlaces& at : equations_.places()) {
+    raise(at.R, 3, (y.segment<3>(at.R) - start_.segment<3>(at.R)).norm());
+    Vector4d back = start_.segment<4>(at.p);
+    back.tail<3>() *= -1;
+    raise(at.p, 4, std::min(1.0, 0.5 * rotation_vector(quaternion_product(back, y.segment<4>(at.p))).norm()));
+    raise(at.v, 3, y.segment<3>(at.v).norm());
+    raise(at.w, 3, y.segment<3>(at.w).norm());
+    for (int k = 0; k < at.n; ++k) {
+      raise(at.q + k, 1, std::abs(y[at.q + k]));
+      raise(at.u + k, 1, std::abs(y[at.u + k]));
+    }
+  }
+  for (size_t i = 0; i < equations_.scene().wheels.size(); ++i)
+    raise(equations_.wheel(i), 1, std::abs(y[equations_.wheel(i)]));
+  raise(equations_.supplied(), 1, std::abs(y[equations_.supplied()]));
+}
+
+void StateScales::weights(double* w) const {
+  Eigen::Map<VectorXd>(w, scale_.size()) = (tolerance_ * scale_).cwiseMax(least_).cwiseInverse();
+}
+
+}  // namespace flexboom::redundant

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "dynamics/multipliers_equations.hpp"
+
+#include <Eigen/Core>
+
+namespace flexboom::redundant {
+
+/// Sizes that errors of the redundant unknowns are weighed against: the largest value so far of the group it belongs to
+/// (displacement from the start for R, half the angle turned for p), and at least a small part of what the energy or
+/// the accelerations at the start could make of it. Multipliers are not weighed.
+class StateScales {
+ public:
+  StateScales(Equations&, const Eigen::VectorXd& y0, const Eigen::VectorXd& y0_dot, double energy, double tolerance,
+              double duration);
+
+  void observe(const Eigen::VectorXd& y);
+  void weights(double* w) const;
+
+ private:
+  void raise(int first, int count, double size);
+
+  const Equations& equations_;
+  double tolerance_;
+  Eigen::VectorXd start_, scale_, least_;  // least: some round-off, or Newton can not converge
+};
+
+}  // namespace flexboom::redundant

@@ -1,0 +1,81 @@
+#include "dynamics/ode.hpp"
+
+#include "fem/check.hpp"
+
+#include <Eigen/LU>
+
+#include <vector>
+
+namespace flexboom {
+
+namespace {
+
+class OdeOfSystem final : public Ode {
+ public:
+  explicit OdeOfSystem(const System& system) : system_(system), work_(system.workspace()) {}
+
+  int size() const override { return system_.layout().size; }
+  int stops() const override { return static_cast<int>(system_.appendages().size()); }
+  void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) override {
+    system_.derivative(t, y, contact, *work_, y_dot);
+  }
+  void jacobian(double, const double* y, std::span<const char> contact) override {
+    system_.jacobian(y, contact, *work_);
+  }
+  void factorise(double gamma) override { system_.factorise_newton(gamma, *work_); }
+  void solve(const double* b, double* x) override { system_.solve_newton(b, *work_, x); }
+  double gap(const double* y, int stop) const override { return system_.gap(y, stop); }
+  double gap_rate(const double* y, int stop) const override { return system_.gap_rate(y, stop); }
+
+ private:
+  const System& system_;
+  WorkspaceHandle work_;
+};
+
+class OdeOfTree final : public Ode {
+ public:
+  explicit OdeOfTree(const Tree& tree)
+      : tree_(tree), work_(tree.workspace()), contact_(tree.scene().joints.size(), 0), x_(tree.layout().size) {}
+
+  int size() const override { return tree_.layout().size; }
+  int stops() const override { return static_cast<int>(tree_.stops().size()); }
+  void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) override {
+    tree_.derivative(t, y, of_joints(contact), *work_, y_dot);
+  }
+  void jacobian(double t, const double* y, std::span<const char> contact) override {
+    tree_.jacobian(t, y, of_joints(contact), *work_, J_);
+  }
+  void factorise(double gamma) override {
+    newton_ = -gamma * J_;
+    newton_.diagonal().array() += 1.0;
+    if (!newton_.allFinite()) throw NumericalError("the Jacobian of the equations of motion is not finite");
+    lu_.compute(newton_);
+  }
+  void solve(const double* b, double* x) override {
+    x_ = lu_.solve(Eigen::Map<const Eigen::VectorXd>(b, size()));
+    Eigen::Map<Eigen::VectorXd>(x, size()) = x_;
+  }
+  double gap(const double* y, int stop) const override { return tree_.gap(y, joint(stop)); }
+  double gap_rate(const double* y, int stop) const override { return tree_.gap_rate(y, joint(stop)); }
+
+ private:
+  int joint(int stop) const { return tree_.stops()[static_cast<size_t>(stop)]; }
+  std::span<const char> of_joints(std::span<const char> contact) {
+    for (size_t i = 0; i < contact.size(); ++i) contact_[static_cast<size_t>(joint(static_cast<int>(i)))] = contact[i];
+    return contact_;
+  }
+
+  const Tree& tree_;
+  TreeWorkspaceHandle work_;
+  std::vector<char> contact_;
+  Eigen::MatrixXd J_, newton_;
+  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  Eigen::VectorXd x_;
+};
+
+}  // namespace
+
+std::unique_ptr<Ode> ode_of(const System& system) { return std::make_unique<OdeOfSystem>(system); }
+std::unique_ptr<Ode> ode_of(const Tree& tree) { return std::make_unique<OdeOfTree>(tree); }
+
+}  // namespace flexboom

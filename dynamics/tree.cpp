@@ -1,0 +1,196 @@
+#include "dynamics/tree.hpp"
+
+#include "dynamics/tree_impl.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+
+// As in system.cpp: compiled for any x86-64 and for one with AVX2 and FMA.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
+#define FLEXBOOM_INNER_LOOP __attribute__((target_clones("arch=haswell", "default"), flatten))
+#else
+#define FLEXBOOM_INNER_LOOP
+#endif
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace tree {
+
+void set_instant(const Model& model, double t, Instant& instant) {
+  for (size_t i = 0; i < model.links.size(); ++i) {
+    const Link& link = model.links[i];
+    if (!link.prescribed) continue;
+    const std::vector<TimeFunction>& functions = model.scene->joints[static_cast<size_t>(link.joint)].prescribed;
+    for (size_t k = 0; k < functions.size(); ++k) {
+      instant.drives[i].value[k] = functions[k].value(t) - link.threshold;
+      instant.drives[i].rate[k] = functions[k].rate(t);
+      instant.drives[i].acceleration[k] = functions[k].acceleration(t);
+    }
+  }
+  const auto value = [t](const std::function<double(double)>& f) { return f ? f(t) : 0.0; };
+  for (size_t i = 0; i < model.loads.size(); ++i) {
+    const Load& load = model.scene->loads[i];
+    instant.loads[i] = {{value(load.force[0]), value(load.force[1]), value(load.force[2])},
+                        {value(load.torque[0]), value(load.torque[1]), value(load.torque[2])}};
+  }
+  for (size_t i = 0; i < model.wheels.size(); ++i) instant.wheels[i] = value(model.scene->wheels[i].torque);
+}
+
+}  // namespace tree
+
+namespace {
+
+/// A joint must move inertia, else its acceleration is noise. At the state where all coordinates are zero.
+void check_inertia(const Tree& system, const tree::Model& model) {
+  VectorXd y = system.pack(system.at_rest()), y_dot(y.size());
+  const TreeWorkspaceHandle work = system.workspace();
+  const std::vector<char> open(system.scene().joints.size(), 0);
+  system.derivative(0, y.data(), open, *work, y_dot.data());
+  for (size_t i = model.links.size(); i-- > 0;) {  // tips first: what is bad there spoils all before
+    const tree::Link& link = model.links[i];
+    const tree::LinkScratch<double>& s = work->scratch.links[i];
+    const JointType& type = joint_type(link.kind);
+    const std::string& joint = system.scene().joints[static_cast<size_t>(link.joint)].name;
+    const std::string& body = system.scene().bodies[static_cast<size_t>(link.index)].name;
+    const double trace = link.body.J0.xx + link.body.J0.yy + link.body.J0.zz;
+    if (link.kind == JointKind::free) {
+      const Matrix3d mass = spatial::eigen(s.I.tt), J = spatial::eigen(s.I.ww);
+      Matrix3d c;
+      for (int r = 0; r < 3; ++r) c.row(r) = spatial::eigen(s.I.tw.row[static_cast<size_t>(r)]).transpose();
+      const Matrix3d left = J - c.transpose() * mass.ldlt().solve(c);
+      const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>((left + left.transpose()) / 2).eigenvalues()(0);
+      require(
+          least > 1e-12 * J.trace() && mass.allFinite(),
+          fmt::format("joint {}: with everything on it, body {} has an inertia of {:.3g} of {:.3g} kg m^2 about one "
+                      "axis: too little to compute with",
+                      joint, body, std::max(0.0, least), J.trace()));
+    } else if (!link.prescribed) {
+      for (int k = 0; k < type.freedoms; ++k) {
+        const bool slides = type.freedom[static_cast<size_t>(k)] < Freedom::turn_x;
+        const double D = 1 / s.freedom[static_cast<size_t>(k)].inverse_D, scale = slides ? link.body.m : trace;
+        require(D > 1e-12 * scale && std::isfinite(D),
+                fmt::format("joint {}: freedom {} of it moves an inertia of {:.3g} of {:.3g} {}: too little to compute "
+                            "with; give body {} inertia there, or fewer modes",
+                            joint, k + 1, D, scale, slides ? "kg" : "kg m^2", body));
+      }
+    }
+    if (link.b.moves())
+      for (int k = 0; k < link.body.n; ++k)
+        require(s.M[static_cast<size_t>(k * (link.body.n + 1))] > 0,
+                fmt::format("joint {}: held at its marker, body {} has a coordinate without mass", joint, body));
+  }
+}
+
+}  // namespace
+
+Tree::Tree(Multibody scene, std::vector<Stiffening> stiffening) : impl_(std::make_unique<Impl>()) {
+  impl_->scene = std::move(scene);
+  impl_->model = tree::packed_model(impl_->scene, stiffening, impl_->layout);
+  stiffening.resize(impl_->scene.bodies.size(), stiffening[0]);
+  impl_->stiffening = std::move(stiffening);
+  for (const tree::Link& link : impl_->model.links) {
+    const bool stops = link.kind == JointKind::hinge || link.kind == JointKind::slider;
+    if (stops && link.body.stop_stiffness > 0 && !link.prescribed) impl_->stops.push_back(link.joint);
+  }
+  check_inertia(*this, impl_->model);
+}
+
+Tree::~Tree() = default;
+Tree::Tree(Tree&&) noexcept = default;
+
+const Multibody& Tree::scene() const { return impl_->scene; }
+const TreeLayout& Tree::layout() const { return impl_->layout; }
+const std::vector<int>& Tree::stops() const { return impl_->stops; }
+Stiffening Tree::stiffening(int body) const { return impl_->stiffening[static_cast<size_t>(body)]; }
+
+void TreeWorkspaceDeleter::operator()(TreeWorkspace* w) const { delete w; }
+
+TreeWorkspaceHandle Tree::workspace() const {
+  return TreeWorkspaceHandle(new TreeWorkspace(impl_->model, impl_->layout.size));
+}
+
+TreeState Tree::at_rest() const {
+  TreeState s;
+  for (const Joint& joint : impl_->scene.joints) {
+    JointState state;
+    const auto n = static_cast<size_t>(joint_type(joint.kind).scalars);
+    state.coordinate.assign(n, n == 1 && joint.mechanism.stiffness > 0 ? joint.mechanism.rest : 0.0);
+    state.rate.assign(n, 0.0);
+    s.joints.push_back(std::move(state));
+  }
+  for (const ReducedBody& body : impl_->scene.bodies) {
+    s.q.push_back(VectorXd::Zero(body.n()));
+    s.q_dot.push_back(VectorXd::Zero(body.n()));
+  }
+  for (const ReactionWheel& wheel : impl_->scene.wheels) s.spin.push_back(wheel.spin);
+  return s;
+}
+
+VectorXd Tree::pack(const TreeState& s) const {
+  VectorXd y = VectorXd::Zero(impl_->layout.size);
+  for (const tree::Link& link : impl_->model.links) {
+    const JointState& joint = s.joints[static_cast<size_t>(link.joint)];
+    const JointType& type = joint_type(link.kind);
+    for (int i = 0; i < type.scalars; ++i) {
+      y[link.scalar + i] = joint.coordinate[static_cast<size_t>(i)] - link.threshold;
+      y[link.rate + i] = joint.rate[static_cast<size_t>(i)];
+    }
+    if (type.turns) y.segment<4>(link.attitude) = joint.attitude.normalized();
+    if (type.turns) y.segment<3>(link.omega) = joint.omega;
+    if (type.floats) y.segment<3>(link.position) = joint.position;
+    if (type.floats) y.segment<3>(link.velocity) = joint.velocity;
+    y.segment(link.q, link.body.n) = s.q[static_cast<size_t>(link.index)];
+    y.segment(link.q_dot, link.body.n) = s.q_dot[static_cast<size_t>(link.index)];
+  }
+  for (size_t i = 0; i < s.spin.size(); ++i) y[impl_->layout.spin + static_cast<int>(i)] = s.spin[i];
+  return y;
+}
+
+TreeState Tree::unpack(const Eigen::Ref<const VectorXd>& y) const {
+  TreeState s = at_rest();
+  for (const tree::Link& link : impl_->model.links) {
+    JointState& joint = s.joints[static_cast<size_t>(link.joint)];
+    const JointType& type = joint_type(link.kind);
+    for (int i = 0; i < type.scalars; ++i) {
+      joint.coordinate[static_cast<size_t>(i)] = y[link.scalar + i] + link.threshold;
+      joint.rate[static_cast<size_t>(i)] = y[link.rate + i];
+    }
+    if (type.turns) joint.attitude = y.segment<4>(link.attitude);
+    if (type.turns) joint.omega = y.segment<3>(link.omega);
+    if (type.floats) joint.position = y.segment<3>(link.position);
+    if (type.floats) joint.velocity = y.segment<3>(link.velocity);
+    s.q[static_cast<size_t>(link.index)] = y.segment(link.q, link.body.n);
+    s.q_dot[static_cast<size_t>(link.index)] = y.segment(link.q_dot, link.body.n);
+  }
+  for (size_t i = 0; i < s.spin.size(); ++i) s.spin[i] = y[impl_->layout.spin + static_cast<int>(i)];
+  return s;
+}
+
+void Tree::impose(double t, Eigen::Ref<VectorXd> y) const {
+  for (const tree::Link& link : impl_->model.links) {
+    if (!link.prescribed) continue;
+    const std::vector<TimeFunction>& f = impl_->scene.joints[static_cast<size_t>(link.joint)].prescribed;
+    for (size_t k = 0; k < f.size(); ++k) {
+      y[link.scalar + static_cast<int>(k)] = f[k].value(t) - link.threshold;
+      y[link.rate + static_cast<int>(k)] = f[k].rate(t);
+    }
+  }
+}
+
+FLEXBOOM_INNER_LOOP
+void Tree::derivative(double t, const double* y, std::span<const char> contact, TreeWorkspace& w, double* y_dot) const {
+  tree::set_instant(impl_->model, t, w.instant);
+  tree::derivative(impl_->model, y, w.instant, contact, w.scratch, y_dot);
+}
+
+}  // namespace flexboom

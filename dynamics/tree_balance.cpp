@@ -1,0 +1,208 @@
+#include "dynamics/tree_impl.hpp"
+#include "fem/check.hpp"
+#include "reduction/geometric_stiffness.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using spatial::eigen;
+using spatial::Vec3;
+
+namespace {
+
+/// Everything at (t, y), poses included.
+TreeWorkspaceHandle evaluated(const Tree& system, const tree::Model& model, double t,
+                              const Eigen::Ref<const VectorXd>& y, std::span<const char> contact) {
+  require(y.size() == system.layout().size, "the state has the wrong size");
+  TreeWorkspaceHandle work = system.workspace();
+  VectorXd y_dot(y.size());
+  const VectorXd state = y;
+  system.derivative(t, state.data(), contact, *work, y_dot.data());
+  tree::move_links(model, state.data(), work->instant, true, work->scratch);
+  return work;
+}
+
+std::vector<char> open_stops(const Tree& system) { return std::vector<char>(system.scene().joints.size(), 0); }
+
+double mechanism_energy(const HingeMechanism& m, double coordinate) {
+  const double stretch = coordinate - m.rest, depth = std::max(0.0, coordinate - m.threshold);
+  return 0.5 * m.stiffness * stretch * stretch + 0.5 * m.stop_stiffness * depth * depth;
+}
+
+double elastic_energy(const tree::Link& link, const Joint& joint, const ReducedBody& body, const VectorXd& y) {
+  double energy = 0;
+  if (link.kind == JointKind::hinge || link.kind == JointKind::slider)
+    energy += mechanism_energy(joint.mechanism, y[link.scalar] + link.threshold);
+  const auto q = y.segment(link.q, link.body.n);
+  return link.body.n ? energy + 0.5 * q.dot(body.Ke * q) : energy;
+}
+
+/// Sums over the bodies, about the inertial origin.
+struct Totals {
+  TreeBalance balance;
+  double m = 0;
+  Vector3d first_moment = Vector3d::Zero();
+
+  void add(const tree::Link& link, const tree::LinkScratch<double>& s, const VectorXd& y) {
+    const Vec3<double> v = transposed_product(s.A0, s.v0), &w = s.w;
+    const double* q_dot = y.data() + link.q_dot;
+    const auto n = static_cast<size_t>(link.body.n);
+    Vec3<double> P = link.body.m * v + cross(w, s.mc), H = cross(s.mc, v) + s.J * w;
+    double modal = 0;
+    for (size_t k = 0; k < n; ++k) {
+      const Vec3<double>& Ct = link.second_order ? s.Ct[k] : link.body.Ct[k];
+      P += q_dot[k] * Ct;
+      H += q_dot[k] * s.modes.Cr[k];
+      double p = dot(Ct, v) + dot(s.modes.Cr[k], w);
+      for (size_t l = 0; l < n; ++l) p += link.Me[k * n + l] * q_dot[l];
+      modal += q_dot[k] * p;
+    }
+    balance.kinetic += 0.5 * (dot(v, P) + dot(w, H) + modal);
+    add_momenta(eigen(s.A0 * P), eigen(s.A0 * H), eigen(s.R0));
+    m += link.body.m;
+    first_moment += link.body.m * eigen(s.R0) + eigen(s.A0 * s.mc);
+  }
+
+  void add_momenta(const Vector3d& P, const Vector3d& H, const Vector3d& R) {
+    balance.momentum += P;
+    balance.momentum_scale += P.norm();
+    balance.angular_momentum += H + R.cross(P);
+    balance.angular_momentum_scale += H.norm();
+  }
+};
+
+}  // namespace
+
+TreeBalance Tree::balance(double t, const Eigen::Ref<const VectorXd>& state) const {
+  const tree::Model& model = impl_->model;
+  VectorXd y = state;
+  impose(t, y);
+  const TreeWorkspaceHandle work = evaluated(*this, model, t, y, open_stops(*this));
+  tree::Scratch<double>& scratch = work->scratch;
+  Totals totals;
+  TreeBalance& b = totals.balance;
+  for (size_t i = 0; i < model.links.size(); ++i) {
+    const tree::Link& link = model.links[i];
+    totals.add(link, scratch.links[i], y);
+    b.elastic += elastic_energy(link, impl_->scene.joints[static_cast<size_t>(link.joint)],
+                                impl_->scene.bodies[static_cast<size_t>(link.index)], y);
+  }
+  for (size_t i = 0; i < model.wheels.size(); ++i) {
+    const tree::LinkScratch<double>& s = scratch.links[static_cast<size_t>(model.wheels[i].link)];
+    const Vec3<double>& axis = model.wheels[i].at.position;
+    const double J = impl_->scene.wheels[i].inertia;
+    const double spin = y[model.spin + static_cast<int>(i)] + dot(axis, s.w);
+    b.kinetic += 0.5 * J * spin * spin;
+    totals.add_momenta(Vector3d::Zero(), eigen(s.A0 * ((J * spin) * axis)), Vector3d::Zero());
+  }
+  for (const tree::SpringModel& spring : model.springs) {
+    const auto from = tree::find_place(model, spring.a, y.data(), scratch, scratch.U);
+    const auto to = tree::find_place(model, spring.b, y.data(), scratch, scratch.U);
+    const double stretch = eigen(to.position - from.position).norm() - spring.free_length;
+    b.elastic += 0.5 * spring.stiffness * stretch * stretch;
+  }
+  b.potential = -impl_->scene.gravity.dot(totals.first_moment);
+  b.angular_momentum -= (totals.first_moment / totals.m).cross(b.momentum);
+  for (const TreeLayout::Joint& joint : impl_->layout.joints) b.dissipated_by_joint.push_back(y[joint.dissipated]);
+  for (const double d : b.dissipated_by_joint) b.dissipated += d;
+  b.dissipated += y[impl_->layout.dissipated_elsewhere];
+  b.work = y[impl_->layout.work];
+  return b;
+}
+
+PlaceMotionInSpace Tree::motion(double t, const Eigen::Ref<const VectorXd>& state, const Place& place) const {
+  const tree::Model& model = impl_->model;
+  VectorXd y = state;
+  impose(t, y);
+  const TreeWorkspaceHandle work = workspace();
+  tree::set_instant(model, t, work->instant);
+  tree::move_links(model, y.data(), work->instant, true, work->scratch);
+  const tree::PlacedOn on = tree::packed_place(model, place, "place");
+  const auto found = tree::find_place(model, on, y.data(), work->scratch, work->scratch.U);
+  PlaceMotionInSpace m{eigen(found.position), eigen(found.velocity), eigen(found.omega), {}};
+  for (int i = 0; i < 3; ++i) m.axes.row(i) = eigen(found.axes.row[static_cast<size_t>(i)]).transpose();
+  return m;
+}
+
+std::vector<JointLoad> Tree::joint_loads(double t, const Eigen::Ref<const VectorXd>& y,
+                                         std::span<const char> contact) const {
+  const tree::Model& model = impl_->model;
+  const TreeWorkspaceHandle work = evaluated(*this, model, t, y, contact);
+  std::vector<JointLoad> loads(impl_->scene.joints.size());
+  const VectorXd state = y;
+  for (size_t i = 0; i < model.links.size(); ++i) {
+    const tree::Link& link = model.links[i];
+    if (link.kind == JointKind::free) continue;
+    const tree::LinkScratch<double>& s = work->scratch.links[i];
+    const tree::Twist<double> load = tree::joint_load(s);
+    JointLoad& out = loads[static_cast<size_t>(link.joint)];
+    out.force = eigen(load.t), out.torque = eigen(load.w);
+    for (int k = 0; link.prescribed && k < joint_type(link.kind).scalars; ++k)
+      out.drive.push_back(tree::drive_load(link, k, state.data(), work->instant.drives[i],
+                                           contact[static_cast<size_t>(link.joint)] != 0, s));
+  }
+  return loads;
+}
+
+namespace {
+
+/// Kg of the motion of a body; s: what the sweeps left.
+MatrixXd stiffness_of_motion(const ReducedBody& body, const tree::Link& link, const tree::LinkScratch<double>& s) {
+  const Vec3<double>& o = link.brf_origin;
+  const auto& A = link.brf_axes;
+  const Vec3<double> a = s.acceleration.t + cross(s.acceleration.w, o) + cross(s.w, cross(s.w, o));
+  return motion_stiffness(body, eigen(transposed_product(A, s.w)), eigen(transposed_product(A, a)),
+                          eigen(transposed_product(A, s.acceleration.w)));
+}
+
+/// Adds Kg of a load (force, torque; BRF axes) on a marker.
+void add_marker_load(const ReducedBody& body, const std::string& marker, const Vector3d& force, const Vector3d& torque,
+                     MatrixXd& K) {
+  for (const MarkerStiffness& m : body.Kg.markers) {
+    if (m.marker != marker) continue;
+    for (size_t i = 0; i < m.force.size(); ++i) K += force[static_cast<int>(i)] * m.force[i];
+    for (size_t i = 0; i < m.torque.size(); ++i) K += torque[static_cast<int>(i)] * m.torque[i];
+  }
+}
+
+}  // namespace
+
+std::vector<double> Tree::stiffening_effect(double t, const Eigen::Ref<const VectorXd>& y,
+                                            std::span<const char> contact) const {
+  const tree::Model& model = impl_->model;
+  const TreeWorkspaceHandle work = evaluated(*this, model, t, y, contact);
+  std::vector<MatrixXd> K(impl_->scene.bodies.size());
+  for (size_t i = 0; i < model.links.size(); ++i) {
+    const tree::Link& link = model.links[i];
+    const tree::LinkScratch<double>& s = work->scratch.links[i];
+    K[static_cast<size_t>(link.index)] =
+        stiffness_of_motion(impl_->scene.bodies[static_cast<size_t>(link.index)], link, s);
+    if (!link.hung_on_moving_place) continue;
+    const tree::Link& parent = model.links[static_cast<size_t>(link.parent)];
+    const tree::Twist<double> load = tree::joint_load(s);
+    const Vec3<double> F = -(s.A * load.t), M = -(s.A * load.w) + cross(s.lever, F);
+    add_marker_load(impl_->scene.bodies[static_cast<size_t>(parent.index)],
+                    impl_->scene.joints[static_cast<size_t>(link.joint)].a.marker,
+                    eigen(transposed_product(parent.brf_axes, F)), eigen(transposed_product(parent.brf_axes, M)),
+                    K[static_cast<size_t>(parent.index)]);
+  }
+  std::vector<double> effect(impl_->scene.bodies.size(), 0.0);
+  for (size_t i = 0; i < effect.size(); ++i) {
+    const ReducedBody& body = impl_->scene.bodies[i];
+    if (body.n() == 0 || K[i].isZero(0)) continue;
+    const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(K[i], body.Ke, Eigen::EigenvaluesOnly);
+    if (solver.info() == Eigen::Success) effect[i] = solver.eigenvalues().cwiseAbs().maxCoeff();
+  }
+  return effect;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,166 @@
+#pragma once
+
+// Loads, springs and wheels of a tree, and what follows from its motion, for a scalar T. Internal to `dynamics`.
+
+#include "dynamics/tree_equations.hpp"
+
+namespace flexboom::tree {
+
+/// A place in space: inertial axes, and what a load there does to the body.
+template <class T>
+struct PlaceInSpace {
+  LinkScratch<T>* link = nullptr;  // nullptr: the inertial frame
+  Twist<T>* U = nullptr;
+  size_t n = 0;
+  PlaceMotion<T> place;
+  Mat3<T> axes;
+  Vec3<T> position, velocity, omega;
+
+  /// Adds a force and a torque (inertial axes).
+  void push(const Vec3<T>& force, const Vec3<T>& torque) const {
+    if (link == nullptr) return;
+    const Vec3<T> F = transposed_product(link->A0, force), M = transposed_product(link->A0, torque);
+    link->external += Twist<T>{F, cross(place.r, F) + M};
+    for (size_t k = 0; k < n; ++k) link->external_modal[k] += dot(U[k].t, F) + dot(U[k].w, M);
+  }
+};
+
+/// U: room for the motion of the place by each coordinate.
+template <class T>
+PlaceInSpace<T> find_place(const Model& model, const PlacedOn& on, const T* y, Scratch<T>& scratch,
+                           std::vector<Twist<T>>& U) {
+  PlaceInSpace<T> p;
+  if (on.link < 0) {
+    p.position = equations::lift<T>(on.at.position);
+    p.axes = lift<T>(on.at.axes);
+    return p;
+  }
+  const Link& link = model.links[static_cast<size_t>(on.link)];
+  LinkScratch<T>& s = scratch.links[static_cast<size_t>(on.link)];
+  p.link = &s;
+  if (on.at.moves()) {
+    p.U = U.data();
+    p.n = static_cast<size_t>(link.body.n);
+    move_place(on.at, y + link.q, y + link.q_dot, p.place, p.U);
+  } else {
+    fix_place(on.at, p.place);
+  }
+  p.axes = product(s.A0, p.place.E);
+  p.position = s.R0 + s.A0 * p.place.r;
+  p.velocity = s.v0 + s.A0 * (p.place.r_dot + cross(s.w, p.place.r));
+  p.omega = s.A0 * (s.w + p.place.w);
+  return p;
+}
+
+template <class T>
+void pull_spring(const Model& model, const SpringModel& spring, const T* y, Scratch<T>& scratch) {
+  using std::sqrt;
+  const PlaceInSpace<T> a = find_place(model, spring.a, y, scratch, scratch.U);
+  const PlaceInSpace<T> b = find_place(model, spring.b, y, scratch, scratch.U_other);
+  const Vec3<T> d = b.position - a.position;
+  const T squared = dot(d, d);
+  if (!(value_of(squared) > 0)) return;  // no direction
+  const T length = sqrt(squared), inverse = T(1.0) / length;
+  const T rate = dot(d, b.velocity - a.velocity) * inverse;
+  const T pull = spring.stiffness * (length - T(spring.free_length)) + spring.damping * rate;
+  const Vec3<T> force = (pull * inverse) * d;
+  a.push(force, Vec3<T>{});
+  b.push(-force, Vec3<T>{});
+  scratch.loss += spring.damping * (rate * rate);
+}
+
+/// Sums all external loads of the links.
+template <class T>
+void apply_forces(const Model& model, const T* y, const Instant& instant, Scratch<T>& scratch) {
+  for (LinkScratch<T>& s : scratch.links) {
+    s.external = {};
+    for (T& f : s.external_modal) f = T(0.0);
+  }
+  for (size_t i = 0; i < model.loads.size(); ++i) {
+    const PlaceInSpace<T> at = find_place(model, model.loads[i], y, scratch, scratch.U);
+    Vec3<T> force = equations::lift<T>(instant.loads[i].t), torque = equations::lift<T>(instant.loads[i].w);
+    if (!model.scene->loads[i].inertial_axes) force = at.axes * force, torque = at.axes * torque;
+    at.push(force, torque);
+    scratch.power += dot(force, at.velocity) + dot(torque, at.omega);
+  }
+  for (const SpringModel& spring : model.springs) pull_spring(model, spring, y, scratch);
+  for (size_t i = 0; i < model.wheels.size(); ++i) {  // torque of the rotor, and its momentum turned with the body
+    LinkScratch<T>& s = scratch.links[static_cast<size_t>(model.wheels[i].link)];
+    const Vec3<double>& axis = model.wheels[i].at.position;
+    const T spin = y[model.spin + static_cast<int>(i)];
+    const T momentum = model.scene->wheels[i].inertia * (spin + dot(axis, s.w));
+    s.external.w -= instant.wheels[i] * equations::lift<T>(axis) + cross(s.w, momentum * axis);
+    scratch.power += instant.wheels[i] * spin;
+  }
+}
+
+/// 1/2 quaternion * (0, omega).
+template <class T>
+void quaternion_rate(const T* q, const T* w, T* q_dot) {
+  q_dot[0] = -0.5 * (q[1] * w[0] + q[2] * w[1] + q[3] * w[2]);
+  q_dot[1] = 0.5 * (q[0] * w[0] + q[2] * w[2] - q[3] * w[1]);
+  q_dot[2] = 0.5 * (q[0] * w[1] + q[3] * w[0] - q[1] * w[2]);
+  q_dot[3] = 0.5 * (q[0] * w[2] + q[1] * w[1] - q[2] * w[0]);
+}
+
+/// Power that the drive of a prescribed joint gives: its load less the mechanism's.
+template <class T>
+T drive_load(const Link& link, int i, const T* y, const Instant::Drive& drive, bool contact, const LinkScratch<T>& s) {
+  const T load = along(joint_type(link.kind).freedom[static_cast<size_t>(i)], s.turn_z_of_a, joint_load(s));
+  return i == 0 ? load - mechanism_load(link, y, drive, contact) : load;
+}
+
+/// The rates of everything that is no acceleration.
+template <class T>
+void follow(const Model& model, const T* y, const Instant& instant, std::span<const char> contact, Scratch<T>& scratch,
+            T* y_dot) {
+  for (size_t i = 0; i < model.links.size(); ++i) {
+    const Link& link = model.links[i];
+    const LinkScratch<T>& s = scratch.links[i];
+    const equations::Body& b = link.body;
+    const JointType& type = joint_type(link.kind);
+    const JointCoordinates<T> joint(link, y, instant.drives[i]);
+    for (int k = 0; k < type.scalars; ++k) {
+      y_dot[link.scalar + k] = joint.rate[static_cast<size_t>(k)];
+      if (!link.prescribed) continue;
+      y_dot[link.rate + k] = T(instant.drives[i].acceleration[static_cast<size_t>(k)]);
+      const bool closed = contact[static_cast<size_t>(link.joint)] != 0;
+      scratch.power += joint.rate[static_cast<size_t>(k)] * drive_load(link, k, y, instant.drives[i], closed, s);
+    }
+    if (type.turns) quaternion_rate(y + link.attitude, y + link.omega, y_dot + link.attitude);
+    if (type.floats)
+      for (int k = 0; k < 3; ++k) y_dot[link.position + k] = y[link.velocity + k];
+    const bool damped = link.kind == JointKind::hinge || link.kind == JointKind::slider;
+    y_dot[link.dissipated] = damped ? b.damping * (joint.rate[0] * joint.rate[0]) : T(0.0);
+    const T* v = y + link.q_dot;
+    const auto n = static_cast<size_t>(b.n);
+    T loss = T(0.0);
+    for (size_t k = 0; k < n; ++k) {
+      y_dot[link.q + static_cast<int>(k)] = v[k];
+      T force = T(0.0);
+      for (size_t l = b.row_begin(k); l < b.row_end(k); ++l) force += b.De[k * n + l] * v[l];
+      loss += v[k] * force;
+    }
+    scratch.loss += loss;
+  }
+  for (size_t i = 0; i < model.wheels.size(); ++i) {
+    const LinkScratch<T>& s = scratch.links[static_cast<size_t>(model.wheels[i].link)];
+    y_dot[model.spin + static_cast<int>(i)] =
+        T(instant.wheels[i] / model.scene->wheels[i].inertia) - dot(model.wheels[i].at.position, s.acceleration.w);
+  }
+  y_dot[model.losses] = scratch.loss;
+  y_dot[model.work] = scratch.power;
+}
+
+/// f(t, y).
+template <class T>
+void derivative(const Model& model, const T* y, const Instant& instant, std::span<const char> contact,
+                Scratch<T>& scratch, T* y_dot) {
+  scratch.loss = scratch.power = T(0.0);
+  move_links(model, y, instant, model.poses, scratch);
+  if (model.forces) apply_forces(model, y, instant, scratch);
+  accelerate(model, y, instant, contact, scratch, y_dot);
+  follow(model, y, instant, contact, scratch, y_dot);
+}
+
+}  // namespace flexboom::tree

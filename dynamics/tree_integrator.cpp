@@ -1,0 +1,338 @@
+#include "dynamics/tree_integrator.hpp"
+
+#include "dynamics/cvode.hpp"
+#include "fem/check.hpp"
+#include "fem/stopwatch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace flexboom {
+
+using Eigen::VectorXd;
+
+namespace {
+
+/// What each state's error is measured against: the largest value so far of its group, and no less than a small part
+/// of the body's size (lengths, deflections), of a radian, and of these in the time they take.
+class TreeScales {
+ public:
+  TreeScales(const Tree& tree, const VectorXd& y0, double tolerance) : tree_(tree) {
+    error_.tolerance = tolerance;
+    const TreeLayout& l = tree.layout();
+    double length = 0;
+    for (const ReducedBody& b : tree.scene().bodies) length = std::max(length, std::sqrt(b.J0.trace() / b.m));
+    error_.scale = VectorXd::Constant(l.size, part * std::max(length, 1.0));
+    const double energy = std::abs(tree.balance(0, y0).kinetic) + std::abs(tree.balance(0, y0).elastic);
+    for (const int i : {l.dissipated_elsewhere, l.work}) error_.scale[i] = std::max(energy, part);
+    for (size_t i = 0; i < l.joints.size(); ++i) {
+      const TreeLayout::Joint& j = l.joints[i];
+      error_.scale[j.dissipated] = std::max(energy, part);
+      const int scalars = joint_type(tree.scene().joints[i].kind).scalars;
+      for (int k = 0; k < scalars; ++k)
+        groups_.push_back({j.scalar + k, 1}), groups_.push_back({l.rate(j.scalar + k), 1});
+      for (const int at : {j.omega, j.position, j.velocity})
+        if (at >= 0) groups_.push_back({at, 3});
+      // A quaternion's entries are near 1: less than its round-off can not be asked for.
+      if (j.attitude >= 0) error_.scale.segment<4>(j.attitude).setConstant(1.0);
+    }
+    for (size_t b = 0; b < l.q.size(); ++b) {
+      const ReducedBody& body = tree.scene().bodies[b];
+      for (int k = 0; k < body.n(); ++k) {
+        const double size = part * length * std::sqrt(body.m / body.Me(k, k));
+        error_.scale[l.q[b] + k] = size;
+        error_.scale[l.rate(l.q[b] + k)] = size * std::sqrt(body.Ke(k, k) / body.Me(k, k));
+        groups_.push_back({l.q[b] + k, 1}), groups_.push_back({l.rate(l.q[b] + k), 1});
+      }
+    }
+    for (size_t i = 0; i < tree.scene().wheels.size(); ++i) groups_.push_back({l.spin + static_cast<int>(i), 1});
+    observe(y0);
+  }
+
+  const ErrorScale& error() const { return error_; }
+
+  void observe(const VectorXd& y) {
+    for (const Group& g : groups_) {
+      const double size = y.segment(g.first, g.count).norm();
+      for (int i = g.first; i < g.first + g.count; ++i) error_.scale[i] = std::max(error_.scale[i], size);
+    }
+    const TreeLayout& l = tree_.layout();
+    for (int i = l.dissipated; i < l.size; ++i) error_.scale[i] = std::max(error_.scale[i], std::abs(y[i]));
+  }
+
+ private:
+  static constexpr double part = 1e-5;
+  struct Group {
+    int first, count;
+  };
+
+  const Tree& tree_;
+  std::vector<Group> groups_;
+  ErrorScale error_;
+};
+
+struct Method {
+  std::string_view name;
+  double local_share;  // as in the table of integrators
+  std::unique_ptr<Stepper> (*make)(std::unique_ptr<Ode>, const ErrorScale&);
+};
+constexpr Method methods[] = {{"adams", 0.001, make_cvode_adams}, {"bdf", 0.005, make_cvode_bdf}};
+
+const Method& method_named(const std::string& name) {
+  for (const Method& m : methods)
+    if (m.name == name) return m;
+  if (name == IntegratorOptions{}.method) return methods[0];
+  throw InputError(fmt::format("integrator '{}' is not known for trees; there are: 'adams' 'bdf'", name));
+}
+
+/// One run: the event loop around a method.
+class TreeFlight {
+ public:
+  TreeFlight(const Tree& tree, const VectorXd& y0, const IntegratorOptions& options, const Method& method)
+      : tree_(tree),
+        options_(options),
+        settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
+        scales_(tree, y0, method.local_share * options.tolerance),
+        ode_(ode_of(tree)),
+        stepper_(method.make(ode_of(tree), scales_.error())),
+        y_(y0),
+        y_dot_(y0.size()) {
+    const size_t stops = tree.stops().size();
+    closed_.assign(stops, 0), armed_.assign(stops, 1), crossed_.assign(stops, 0);
+    largest_.assign(stops, 0.0);
+    result_.summary.method = method.name;
+    result_.summary.settled.assign(stops, -1.0);
+    result_.stiffening_effect.assign(tree.scene().bodies.size(), 0.0);
+    contacts_at_start();
+  }
+
+  TreeTrajectory fly() {
+    const Stopwatch start;
+    record(0.0, y_);
+    stepper_->restart(0.0, y_, closed_, armed_);
+    while (t_ < options_.duration && !stopped()) advance();
+    finish(start.seconds());
+    return std::move(result_);
+  }
+
+ private:
+  void contacts_at_start() {
+    ode_->derivative(0, y_.data(), closed_, y_dot_.data());
+    for (size_t i = 0; i < closed_.size(); ++i) {
+      const int stop = static_cast<int>(i);
+      const double gap = ode_->gap(y_.data(), stop), rate = ode_->gap_rate(y_.data(), stop);
+      const double push = ode_->gap_rate(y_dot_.data(), stop);
+      closed_[i] = gap > 0 || (gap == 0 && (rate > 0 || (rate == 0 && push > 0)));
+    }
+  }
+
+  bool stopped() {
+    const bool stop = options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed);
+    result_.summary.interrupted = result_.summary.interrupted || stop;
+    return stop;
+  }
+
+  void advance() {
+    stepper_->step(limit(), t_, y_, crossed_);
+    if (++steps_ > options_.max_steps)
+      throw NumericalError(
+          fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t_, options_.duration));
+    if (!y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", t_));
+    for (double next = output_time(); next <= t_; next = output_time()) {
+      VectorXd sample = y_;
+      if (next < t_) stepper_->interpolate(next, sample);
+      record(next, sample);
+    }
+    scales_.observe(y_);
+    const bool corner = std::binary_search(options_.corners.begin(), options_.corners.end(), t_);
+    if (switch_contacts() || corner) {
+      stepper_->restart(t_, y_, closed_, armed_);
+      ++result_.summary.restarts;
+    }
+    if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
+  }
+
+  /// Where the next step must end at the latest.
+  double limit() const {
+    double end = options_.step_to_outputs ? std::min(options_.duration, output_time()) : options_.duration;
+    const auto corner = std::upper_bound(options_.corners.begin(), options_.corners.end(), t_);
+    if (corner != options_.corners.end()) end = std::min(end, *corner);
+    return end;
+  }
+
+  /// Time of the next output; the last one is the end exactly.
+  double output_time() const {
+    const double next = static_cast<double>(result_.time.size()) * options_.output_step, last = options_.duration;
+    if (next < last * (1 - 1e-12)) return next;
+    return result_.time.back() < last ? last : std::numeric_limits<double>::infinity();
+  }
+
+  void record(double t, VectorXd y) {
+    for (const TreeLayout::Joint& j : tree_.layout().joints) {
+      if (j.attitude < 0) continue;
+      auto attitude = y.segment<4>(j.attitude);
+      result_.summary.constraint_drift = std::max(result_.summary.constraint_drift, std::abs(attitude.norm() - 1));
+      attitude.normalize();
+    }
+    tree_.impose(t, y);
+    result_.balance.push_back(tree_.balance(t, y));
+    look_at_stiffening(t, y);
+    result_.time.push_back(t);
+    result_.y.push_back(std::move(y));
+  }
+
+  /// At every output of a short list, at some of a long one: an eigenvalue problem for each body.
+  void look_at_stiffening(double t, const VectorXd& y) {
+    const auto stride = static_cast<size_t>(options_.duration / options_.output_step / 500) + 1;
+    if (result_.time.size() % stride != 0) return;
+    std::vector<char> contact(tree_.scene().joints.size(), 0);
+    for (size_t i = 0; i < closed_.size(); ++i) contact[static_cast<size_t>(tree_.stops()[i])] = closed_[i];
+    const std::vector<double> effect = tree_.stiffening_effect(t, y, contact);
+    for (size_t b = 0; b < effect.size(); ++b)
+      result_.stiffening_effect[b] = std::max(result_.stiffening_effect[b], effect[b]);
+  }
+
+  bool switch_contacts() {
+    bool changed = false;
+    for (size_t i = 0; i < crossed_.size(); ++i) {
+      const int joint = tree_.stops()[i];
+      const double rate = tree_.gap_rate(y_.data(), joint);
+      largest_[i] = std::max(largest_[i], std::abs(rate));
+      const bool slipped = slipped_through(i);
+      if (crossed_[i] != 0 || slipped) {
+        double& gap = y_[tree_.layout().joints[static_cast<size_t>(joint)].scalar];
+        const bool contact = slipped ? gap > 0 : crossed_[i] > 0;
+        if (!slipped) gap = 0;  // on the stop, exactly: the root is good to round-off of t
+        closed_[i] = contact;
+        result_.events.push_back({t_, joint, contact, rate});
+        changed = true;
+        if (std::abs(rate) < settle_ * largest_[i] && !pushed(i)) {
+          result_.summary.settled[i] = t_;
+          armed_[i] = closed_[i] = 0;
+        }
+      } else if (!armed_[i] && std::abs(rate) > 2 * settle_ * largest_[i]) {
+        result_.summary.settled[i] = -1;
+        armed_[i] = 1;
+        closed_[i] = tree_.gap(y_.data(), joint) > 0;
+        changed = true;
+      }
+    }
+    return changed;
+  }
+
+  /// Is the gap on the wrong side of the flag, with no crossing found?
+  bool slipped_through(size_t i) const {
+    if (!armed_[i] || crossed_[i] != 0) return false;
+    const int joint = tree_.stops()[i];
+    const double gap = tree_.gap(y_.data(), joint);
+    const double noise =
+        scales_.error().tolerance * scales_.error().scale[tree_.layout().joints[static_cast<size_t>(joint)].scalar];
+    return closed_[i] ? gap < -noise : gap > noise;
+  }
+
+  /// Does something push a joint that is on its stop, so that it will not stay there?
+  bool pushed(size_t i) {
+    ode_->derivative(t_, y_.data(), closed_, y_dot_.data());
+    const Joint& joint = tree_.scene().joints[static_cast<size_t>(tree_.stops()[i])];
+    const ReducedBody& body = tree_.scene().bodies[static_cast<size_t>(joint.b.body)];
+    const double inertia = joint.kind == JointKind::slider ? body.m : body.J0.trace();
+    const double period = std::sqrt(inertia / (joint.mechanism.stiffness + joint.mechanism.stop_stiffness));
+    return std::abs(ode_->gap_rate(y_dot_.data(), static_cast<int>(i))) * period > 2 * settle_ * largest_[i];
+  }
+
+  void finish(double seconds) {
+    IntegrationSummary& s = result_.summary;
+    const StepCounts c = stepper_->counts();
+    s.steps = c.steps, s.rhs_evaluations = c.rhs_evaluations, s.jacobian_evaluations = c.jacobian_evaluations;
+    s.factorisations = c.factorisations, s.newton_iterations = c.newton_iterations;
+    s.error_test_failures = c.error_test_failures;
+    s.seconds = seconds;
+    if (s.interrupted && result_.time.back() < t_) record(t_, y_);
+    conservation(s);
+    warn();
+  }
+
+  void conservation(IntegrationSummary& s) const {
+    const TreeBalance& first = result_.balance.front();
+    double energy = 0, gap = 0, dP = 0, dH = 0, P = 0, H = 0;
+    for (const TreeBalance& b : result_.balance) {
+      energy = std::max({energy, b.kinetic + b.elastic, std::abs(b.work), b.dissipated});
+      gap = std::max(gap, std::abs(b.energy() - first.energy()));
+      dP = std::max(dP, (b.momentum - first.momentum).norm());
+      dH = std::max(dH, (b.angular_momentum - first.angular_momentum).norm());
+      P = std::max(P, b.momentum_scale), H = std::max(H, b.angular_momentum_scale);
+    }
+    s.energy_balance = energy > 0 ? gap / energy : 0;
+    if (flies_freely()) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
+  }
+
+  bool flies_freely() const {
+    const Multibody& scene = tree_.scene();
+    bool free = scene.gravity.isZero(0) && scene.loads.empty();
+    for (const Joint& j : scene.joints) free = free && (j.a.body >= 0 || j.kind == JointKind::free);
+    for (const SpringDamper& s : scene.springs) free = free && s.a.body >= 0 && s.b.body >= 0;
+    return free;
+  }
+
+  void warn() {
+    for (size_t b = 0; b < result_.stiffening_effect.size(); ++b) {
+      const double effect = result_.stiffening_effect[b];
+      if (effect <= options_.tolerance || tree_.stiffening(static_cast<int>(b)) == Stiffening::on) continue;
+      result_.warnings.push_back(
+          fmt::format("body {}: its geometric stiffness is off; it reaches {:.2g} of its stiffness, more than the "
+                      "tolerance {:.2g}{}",
+                      tree_.scene().bodies[b].name, effect, options_.tolerance,
+                      effect > 0.1 ? ": without it the motion can be wrong or diverge" : ""));
+    }
+  }
+
+  const Tree& tree_;
+  const IntegratorOptions& options_;
+  double settle_;
+  TreeScales scales_;
+  std::unique_ptr<Ode> ode_;
+  std::unique_ptr<Stepper> stepper_;
+  std::vector<char> closed_, armed_;
+  std::vector<int> crossed_;
+  std::vector<double> largest_;
+  double t_ = 0;
+  VectorXd y_, y_dot_;
+  long steps_ = 0;
+  TreeTrajectory result_;
+};
+
+}  // namespace
+
+TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o) {
+  require(o.tolerance > 0 && o.tolerance <= 0.1, fmt::format("tolerance {:g} must lie in (0, 0.1]", o.tolerance));
+  require(o.duration > 0 && std::isfinite(o.duration), fmt::format("duration {:g} s must be positive", o.duration));
+  require(o.output_step > 0 && o.duration / o.output_step <= 1e6,
+          fmt::format("output step {:g} s must be positive, and not more than 1e6 of them in {:g} s", o.output_step,
+                      o.duration));
+  require(y0.size() == tree.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
+  VectorXd start = y0;
+  tree.impose(0, start);
+  return TreeFlight(tree, start, o, method_named(o.method)).fly();
+}
+
+std::vector<Stiffening> stiffening_where_it_counts(const Multibody& scene, const TreeState& state, double duration,
+                                                   double tolerance) {
+  const Tree tree(scene);
+  VectorXd y = tree.pack(state);
+  const std::vector<char> open(scene.joints.size(), 0);
+  std::vector<Stiffening> choice(scene.bodies.size(), Stiffening::off);
+  constexpr int samples = 100;
+  for (int i = 0; i <= samples; ++i) {
+    const double t = duration * i / samples;
+    tree.impose(t, y);
+    const std::vector<double> effect = tree.stiffening_effect(t, y, open);
+    for (size_t b = 0; b < effect.size(); ++b)
+      if (effect[b] > tolerance) choice[b] = Stiffening::on;
+  }
+  return choice;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,79 @@
+#pragma once
+
+// What Tree computes with: the scene packed for the inner loop. Internal to `dynamics`.
+
+#include "dynamics/equations.hpp"
+#include "dynamics/tree.hpp"
+
+#include <vector>
+
+namespace flexboom::tree {
+
+using equations::Term;
+using spatial::Mat3;
+using spatial::Sym3;
+using spatial::Vec3;
+
+/// A place on a body, in the body's own frame (its place b, undeformed). With shapes it moves by S q + u2 and turns by
+/// the rotation vector S_theta q + theta2, second order only with geometric stiffness.
+struct PlaceModel {
+  Vec3<double> position;
+  Mat3<double> axes;
+  std::vector<Vec3<double>> S, S_theta;    // n; empty: fixed in the body
+  std::vector<Term> S_slope, theta_slope;  // d S_k / d q_l
+
+  bool moves() const { return !S.empty(); }
+};
+
+/// A body with the joint that carries it. Its frame is place b, undeformed.
+struct Link {
+  equations::Body body;
+  std::vector<double> Me;                // n x n
+  std::vector<Term> Ct_slope, Cr_slope;  // with geometric stiffness: Ct_k gains this q_l, Cr_k too
+  bool second_order = false;
+
+  int index = 0, joint = 0;  // in the scene
+  int parent = -1;           // link; -1: the inertial frame
+  JointKind kind = JointKind::free;
+  PlaceModel a, b;  // a in the parent's frame
+  bool hung_on_moving_place = false;
+  int slot = -1;  // among the children of the parent that hang on moving places
+  int slots = 0;  // own children there
+  double threshold = 0;
+  bool prescribed = false;
+
+  // Places in y, -1: none.
+  int scalar = -1, rate = -1, q = 0, q_dot = 0, omega = -1, position = -1, attitude = -1, velocity = -1,
+      dissipated = -1;
+  Vec3<double> brf_origin;  // of the body's BRF in its frame, and the axes of the BRF there
+  Mat3<double> brf_axes;
+};
+
+struct PlacedOn {
+  int link = -1;
+  PlaceModel at;
+};
+
+struct SpringModel {
+  PlacedOn a, b;
+  double stiffness = 0, free_length = 0, damping = 0;
+};
+
+struct Model {
+  std::vector<Link> links;
+  std::vector<PlacedOn> loads, wheels;  // a wheel's axis is at.position
+  std::vector<SpringModel> springs;
+  Vec3<double> gravity;
+  int spin = 0, losses = 0, work = 0;  // places in y
+  bool forces = false;                 // is there anything beside joints, structures and gravity?
+  bool poses = false;                  // do forces need where bodies are in space?
+  const Multibody* scene = nullptr;
+};
+
+/// @throws InputError as Tree::Tree.
+Model packed_model(const Multibody&, const std::vector<Stiffening>&, TreeLayout&);
+
+/// A place in the frame of its link.
+PlacedOn packed_place(const Model&, const Place&, const std::string& of);
+
+}  // namespace flexboom::tree

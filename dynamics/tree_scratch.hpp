@@ -1,0 +1,97 @@
+#pragma once
+
+// What the sweeps over a tree leave behind for each other, for a scalar T. Internal to `dynamics`.
+
+#include "dynamics/tree_places.hpp"
+
+#include <algorithm>
+#include <array>
+#include <vector>
+
+namespace flexboom::tree {
+
+using equations::HubSystem;
+
+/// A freedom after its elimination: its acceleration is (u - U . A) / D, A that of place b without it.
+template <class T>
+struct Eliminated {
+  Twist<T> U;
+  T u, inverse_D;
+};
+
+template <class T>
+struct LinkScratch {
+  PlaceMotion<T> a, b;  // relative to the frames of parent and body
+  Mat3<T> A;            // place b -> axes of the parent
+  Vec3<T> lever, arm;   // place b from place a, and from the parent's origin; axes of the parent
+  Vec3<T> lever_dot;    // relative to place a
+  Vec3<T> turn_z_of_a;  // of a universal joint: the first axis, in axes of b
+  Vec3<T> w;            // of the body
+  Twist<T> bias;        // acceleration of place b that remains when those of all unknowns and of the parent are zero
+
+  Mat3<T> A0;        // body -> inertial
+  Vec3<T> R0, v0;    // origin of the body and its velocity, inertial axes
+  Vec3<T> v_handle;  // velocity of place b, inertial axes
+
+  equations::BodyScratch<T> modes;
+  Vec3<T> mc;
+  Sym3<T> J;
+  std::vector<Vec3<T>> Ct, Gt;  // of a body with second-order displacements
+  Twist<T> external;            // forces on the body about its origin
+  std::vector<T> external_modal;
+
+  HubSystem<T> I;  // of the body and all that hangs on it; in the end at place b, freedoms eliminated
+  std::array<Eliminated<T>, 3> freedom;
+  Twist<T> base, handle, acceleration;  // of place b without the joint's freedoms; of place b; of the body's origin
+  std::vector<T> q_ddot;
+
+  // Children on moving places, slot by slot.
+  std::vector<HubSystem<T>> hung;  // at their places, axes of the body
+  std::vector<Vec3<T>> place;      // where they are
+  std::vector<Twist<T>> U, P;      // motion per q_dot_k, and per modal force k
+  std::vector<T> K, W, Z, F;       // 6s x 6s, 6s x (6s + 1), 6s x 7, 6s x 7
+
+  // A body that hangs on a moving place of its own.
+  std::vector<Twist<T>> held, C, Y, V;
+  std::vector<T> M, v;
+  Twist<T> beta;
+};
+
+/// What is given at an instant.
+struct Instant {
+  struct Drive {
+    std::array<double, 2> value{}, rate{}, acceleration{};
+  };
+  std::vector<Drive> drives;         // per link
+  std::vector<Twist<double>> loads;  // in their own axes
+  std::vector<double> wheels;        // torques
+};
+
+template <class T>
+struct Scratch {
+  std::vector<LinkScratch<T>> links;
+  std::vector<Twist<T>> U, U_other;  // of a place
+  T loss{}, power{};                 // outside the joints; of loads, wheels and drives [W]
+
+  explicit Scratch(const Model& model) : links(model.links.size()) {
+    size_t most = 0;
+    for (size_t i = 0; i < links.size(); ++i) {
+      const Link& link = model.links[i];
+      LinkScratch<T>& s = links[i];
+      const auto n = static_cast<size_t>(link.body.n), k = static_cast<size_t>(link.slots);
+      most = std::max(most, n);
+      s.modes.Cr.resize(n), s.modes.Gw.resize(n), s.modes.b.resize(n), s.modes.g.resize(n);
+      s.external_modal.resize(n), s.q_ddot.resize(n);
+      if (!link.hung_on_moving_place) fix_place(link.a, s.a);
+      if (link.second_order) s.Ct.resize(n), s.Gt.resize(n);
+      s.hung.resize(k), s.place.resize(k);
+      s.U.resize(k * n), s.P.resize(k * n);
+      s.K.resize(36 * k * k), s.W.resize(6 * k * (6 * k + 1)), s.Z.resize(42 * k), s.F.resize(42 * k);
+      if (link.b.moves())
+        s.held.resize(n), s.C.resize(n), s.Y.resize(n), s.V.resize(n), s.M.resize(n * n), s.v.resize(n);
+    }
+    U.resize(most), U_other.resize(most);
+  }
+};
+
+}  // namespace flexboom::tree

@@ -1,0 +1,33 @@
+#pragma once
+
+// Scratch of one thread for Tree. Internal to `dynamics`.
+
+#include "dynamics/tree_forces.hpp"
+
+namespace flexboom {
+
+class TreeWorkspace {
+ public:
+  static constexpr int lanes = 8;
+  using D = Dual<lanes>;
+
+  TreeWorkspace(const tree::Model& model, int size)
+      : scratch(model), dual(model), in(static_cast<size_t>(size)), out(static_cast<size_t>(size)) {
+    instant.drives.resize(model.links.size());
+    instant.loads.resize(model.loads.size());
+    instant.wheels.resize(model.wheels.size());
+  }
+
+  tree::Scratch<double> scratch;
+  tree::Scratch<D> dual;
+  std::vector<D> in, out;
+  tree::Instant instant;
+};
+
+namespace tree {
+
+/// Evaluates all functions of time.
+void set_instant(const Model&, double t, Instant&);
+
+}  // namespace tree
+}  // namespace flexboom
