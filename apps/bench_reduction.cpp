@@ -305,7 +305,7 @@ class Bench {
     row.modes_seconds =
         fastest([&] { basis = modes_of(model.mesh, model.assembly, model.clamp, row.modes, row.threads); });
     row.reduce_seconds = fastest([&] { body = reduce(model.mesh, model.assembly, basis, "boom 4", row.threads); });
-    const GeometricOptions loads{.markers = {"tip"}, .threads = row.threads, .statics = &model.statics};
+    const GeometricOptions loads{.markers = {"tip"}, .threads = row.threads, .statics = &model.statics, .Ke = &body.Ke};
     row.stiffening_seconds =
         fastest([&] { geometric_stiffness(model.mesh, model.assembly, model.clamp, basis.Phi, loads); });
     row.memory_mb = peak_mb();

@@ -87,6 +87,10 @@ int compare_command(const CompareArguments& a, const CommonOptions& common) {
   } else {
     const Scene scene = load_scene(a.body);
     validate(scene);
+    require(!scene.is_tree,
+            fmt::format("{}: a scene with joints cannot be compared with eq. 14; give one of its bodies as "
+                        "a body file",
+                        a.body));
     bodies = scene.bodies;
     if (!a.no_transient) transients = compare_transients(scene);
   }

@@ -44,7 +44,7 @@ bool asked_to_stop(const RunHooks& hooks) { return hooks.interrupt != nullptr &&
 /// Two more modes in each plane, and both planes: what bends out of the hinge plane counts as left out, too.
 Scene with_more_modes(Scene scene) {
   for (BodyScene& b : scene.bodies) {
-    if (b.structure == "rigid" || b.modes == 0) continue;
+    if (b.structure == "rigid" || b.modes == 0 || !b.is_boom()) continue;
     b.modes = b.directions == "all" ? b.modes + 4 : 2 * (b.modes + 2);
     b.directions = "all";
   }
@@ -113,7 +113,7 @@ ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, 
     budget.truncation = truncation_error(run, flown, hooks, plan);
   if (any_elastic(scene, "beam") && !asked_to_stop(hooks))
     budget.discretisation = change(run, flown, 2, "discretisation", hooks, plan);
-  budget.linearisation = linearisation_estimate(run);
+  budget.linearisation = scene.is_tree ? run.stiffening_left_out : linearisation_estimate(run);
   budget.measured = !asked_to_stop(hooks);
   return budget;
 }

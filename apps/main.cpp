@@ -63,7 +63,7 @@ struct CommandLine {
 
   void add_run() {
     CLI::App* c = command("run", "scene -> models -> transient -> results folder");
-    c->add_option("SCENE", run.scene, "Scene file, or the name of a built-in scene (sport)")->required();
+    c->add_option("SCENE", run.scene, "Scene file, or the name of a built-in scene (sport, tumbling, ...)")->required();
     c->add_option("--duration", run.duration, "Simulated time [s]");
     c->add_option("--tolerance", run.tolerance, "Relative error wanted in the outputs");
     c->add_option("--modes", run.modes, "Elastic coordinates of every body: a number, or auto");

@@ -228,9 +228,9 @@ ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int thread
     statics = static_solver(unknowns(model.mesh, m.assembly.dofs, held).reduced(m.assembly.K), basis);
   const StaticSolver* held_statics = statics ? &*statics : nullptr;
   if (a.stiffening && flies && body.n() > 0) {
-    body.Kg =
-        geometric_stiffness(model.mesh, m.assembly, held, basis.Phi,
-                            {.markers = loaded_markers(body, model.mesh), .threads = threads, .statics = held_statics});
+    body.Kg = geometric_stiffness(
+        model.mesh, m.assembly, held, basis.Phi,
+        {.markers = loaded_markers(body, model.mesh), .threads = threads, .statics = held_statics, .Ke = &body.Ke});
   }
   apply_damping(body, damping);
   body.certificate = certificate(body, model.mesh, m.assembly, held, basis, exact_markers(a), threads, held_statics);

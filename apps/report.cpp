@@ -96,7 +96,38 @@ Curve curve(const Table& table, const std::string& column, const std::string& na
   return c;
 }
 
+/// Of a scene with joints: what each output of its joints and bodies does over time.
+std::vector<Plot> tree_plots(const Folder& f) {
+  const Table& t = f.table;
+  std::vector<Plot> all;
+  Plot angles{"Joint angles", "t [s]", "angle [deg]", {}}, lengths{"Sliders", "t [s]", "length [m]", {}};
+  for (const JointScene& j : f.scene.joints) {
+    if (j.kind == JointKind::hinge) angles.curves.push_back(curve(t, j.name + ".angle", j.name, degrees));
+    if (j.kind == JointKind::universal)
+      for (const char* which : {".angle1", ".angle2"})
+        angles.curves.push_back(curve(t, j.name + which, j.name + which, degrees));
+    if (j.kind == JointKind::slider) lengths.curves.push_back(curve(t, j.name + ".length", j.name));
+    if (!joint_type(j.kind).turns) continue;
+    Plot rotation{"Rotation of " + j.name, "t [s]", "rotation vector [deg]", {}};
+    for (const char* axis : {".x", ".y", ".z"})
+      rotation.curves.push_back(curve(t, j.name + ".rotation" + axis, axis + 1, degrees));
+    all.push_back(rotation);
+  }
+  Plot tip{"Elastic tip displacement, axes of the body", "t [s]", "displacement [mm]", {}};
+  for (const BodyScene& b : f.scene.bodies)
+    for (const std::string axis : {".y", ".z"})
+      if (std::find(t.names.begin(), t.names.end(), b.name + ".tip" + axis) != t.names.end())
+        tip.curves.push_back(curve(t, b.name + ".tip" + axis, b.name + axis, 1e3));
+  Plot energy{"Energy", "t [s]", "energy [J]", {}};
+  for (const char* kind : {"kinetic", "elastic", "potential", "dissipated", "work"})
+    energy.curves.push_back(curve(t, std::string("energy.") + kind, kind));
+  for (Plot* p : {&angles, &lengths, &tip, &energy})
+    if (!p->curves.empty()) all.push_back(std::move(*p));
+  return all;
+}
+
 std::vector<Plot> plots(const Folder& f) {
+  if (f.scene.is_tree) return tree_plots(f);
   const Table& t = f.table;
   std::vector<Plot> all;
   Plot rotation{"Hub rotation from the start", "t [s]", "rotation vector [deg]", {}};
@@ -207,7 +238,8 @@ if(run)n=(n+1)%D.frames.length;requestAnimationFrame(draw);}draw();</script>)";
 /// @throws json::exception when the summary lacks something.
 std::string page(const Folder& f) {
   const json& s = f.summary;
-  const json data = animation_data(f);
+  const json data =
+      f.scene.is_tree ? json() : animation_data(f);  // the moving picture knows hubs with hinged booms only
   std::string h = fmt::format(
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>flexboom: "
       "{0}</title>{1}</head><body>\n<h1>{0}</h1>\n",
@@ -215,10 +247,11 @@ std::string page(const Folder& f) {
   h += fmt::format("<p>{} s simulated in {} s ({} times real time), {} steps, {} contacts and releases.</p>\n",
                    cell(s.at("simulated_seconds")), cell(s.at("seconds").at("integrate")),
                    cell(s.at("real_time_factor")), cell(s.at("steps")), cell(s.at("events")));
-  h += fmt::format(
-      "<canvas id=\"view\" width=\"820\" height=\"420\"></canvas><p>Drawn larger than it is: hub rotation {} times, "
-      "boom deflection {} times. Click to stop or go on.</p>\n",
-      cell(data.at("rotation")), cell(data.at("deflection")));
+  if (!f.scene.is_tree)
+    h += fmt::format(
+        "<canvas id=\"view\" width=\"820\" height=\"420\"></canvas><p>Drawn larger than it is: hub rotation {} times, "
+        "boom deflection {} times. Click to stop or go on.</p>\n",
+        cell(data.at("rotation")), cell(data.at("deflection")));
   for (const Plot& p : plots(f)) h += svg(p);
   h += "<h2>How wrong is it?</h2>\n<table>" + rows(s.at("error_budget")) +
        fmt::format("<tr><th>energy balance</th><td>{}</td></tr><tr><th>momentum drift</th><td>{}</td></tr></table>\n",
@@ -227,6 +260,7 @@ std::string page(const Folder& f) {
   for (const json& line : s.at("plan")) h += "<li>" + escaped(line.get<std::string>()) + "</li>\n";
   for (const json& line : s.at("warnings")) h += "<li><b>warning:</b> " + escaped(line.get<std::string>()) + "</li>\n";
   h += "</ul><h2>The run</h2><table>" + rows(s) + rows(s.at("seconds"), "wall seconds: ") + "</table>\n";
+  if (f.scene.is_tree) return h + "</body></html>\n";
   return h + "<script>const D=" + data.dump() + ";</script>" + player + "</body></html>\n";
 }
 

@@ -1,5 +1,6 @@
 #include "apps/results.hpp"
 
+#include "apps/tree_flight.hpp"
 #include "apps/version.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
@@ -42,15 +43,27 @@ void print_trajectory_csv(std::ostream& out, const OutputTable& table) {
   }
 }
 
-std::string events_csv(const System& system, const Trajectory& motion) {
+std::string events_csv(const std::vector<std::string>& hinges, const Trajectory& motion) {
   std::string out = "time,hinge,kind\n";
   for (const Event& e : motion.events)
-    out += fmt::format("{:.17g},{},{}\n", e.time, system.appendages()[static_cast<size_t>(e.hinge)].body.name,
-                       e.contact ? "contact" : "release");
+    out +=
+        fmt::format("{:.17g},{},{}\n", e.time, hinges[static_cast<size_t>(e.hinge)], e.contact ? "contact" : "release");
   return out;
 }
 
 namespace {
+
+/// Names that the events of a run number: bodies on hinges of the hub, or joints.
+std::vector<std::string> hinge_names(const RunResult& r) {
+  std::vector<std::string> names;
+  for (const JointScene& j : r.scene.joints) names.push_back(j.name);
+  for (const PreparedBody& p : r.bodies)
+    if (!r.scene.is_tree) names.push_back(p.body.name);
+  return names;
+}
+
+/// Is something from outside free to change the momenta?
+bool momenta_change(const Scene& scene) { return scene.is_tree ? !flies_freely(scene) : scene.hub.fixed; }
 
 ordered_json budget_json(const ErrorBudget& b) {
   if (!b.measured)
@@ -117,8 +130,7 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   j["integrator"] = s.method;
   j["tolerance"] = r.scene.tolerance;
   j["energy_balance"] = s.energy_balance;
-  j["momentum_drift"] =
-      r.scene.hub.fixed ? ordered_json() : ordered_json(s.momentum_drift);  // a fixed hub takes momentum
+  j["momentum_drift"] = momenta_change(r.scene) ? ordered_json() : ordered_json(s.momentum_drift);
   j["constraint_drift"] = s.constraint_drift;
   j["error_budget"] = budget_json(r.budget);
   j["accuracy_met"] = r.budget.measured ? ordered_json(r.budget.total() <= r.scene.tolerance) : ordered_json();
@@ -187,8 +199,7 @@ VtkGrid grid_of(const Pose& pose, const System& system) {
 
 }  // namespace
 
-void write_motion(const RunResult& r, const fs::path& folder) {
-  const Flyable f = make_system(r.scene, r.bodies);
+void write_frames(const RunResult& r, const fs::path& folder, const std::function<VtkGrid(size_t row)>& grid) {
   std::vector<std::pair<double, std::string>> frames;
   double next = 0;
   for (size_t i = 0; i < r.trajectory.time.size(); ++i) {
@@ -196,15 +207,19 @@ void write_motion(const RunResult& r, const fs::path& folder) {
     if (t < next - 1e-9 * r.scene.vtu_step) continue;
     next += r.scene.vtu_step * std::max(1.0, std::ceil((t - next) / r.scene.vtu_step + 1e-9));
     const std::string name = fmt::format("motion_{:05d}.vtu", frames.size());
-    write_vtu(folder / name, grid_of(pose_at(r.scene, f.system, r.trajectory.y[i]), f.system));
+    write_vtu(folder / name, grid(i));
     frames.emplace_back(t, name);
   }
   write_pvd(folder / "motion.pvd", frames);
 }
 
+void write_motion(const RunResult& r, const fs::path& folder) {
+  const Flyable f = make_system(r.scene, r.bodies);
+  write_frames(r, folder, [&](size_t i) { return grid_of(pose_at(r.scene, f.system, r.trajectory.y[i]), f.system); });
+}
+
 ordered_json write_results(const RunResult& r, const fs::path& folder) {
   const Stopwatch start;
-  const Flyable f = make_system(r.scene, r.bodies);
   for (const char* old :
        {"summary.json", "trajectory.csv", "events.csv", "motion.pvd", "report.html", "overview.svg"}) {
     std::error_code ignored;
@@ -212,8 +227,8 @@ ordered_json write_results(const RunResult& r, const fs::path& folder) {
   }
   write_file(folder / "scene.toml", to_toml(r.scene));
   write_file(folder / "trajectory.csv", [&r](std::ostream& out) { print_trajectory_csv(out, r.outputs); });
-  write_file(folder / "events.csv", events_csv(f.system, r.trajectory));
-  if (r.scene.vtu_step > 0) write_motion(r, folder);
+  write_file(folder / "events.csv", events_csv(hinge_names(r), r.trajectory));
+  if (r.scene.vtu_step > 0) r.scene.is_tree ? write_tree_motion(r, folder) : write_motion(r, folder);
   const double seconds = start.seconds();
   ordered_json summary = summary_json(r, seconds);
   write_file(folder / "summary.json", summary.dump(2) + "\n");

@@ -2,6 +2,7 @@
 
 #include "apps/simulate.hpp"
 #include "fem/files.hpp"
+#include "fem/vtk.hpp"
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -9,6 +10,7 @@
 #include <functional>
 #include <iosfwd>
 #include <string>
+#include <vector>
 
 namespace flexboom {
 
@@ -18,7 +20,7 @@ void prepare_folder(const std::filesystem::path&);
 /// trajectory.csv and events.csv, 17 significant digits. The first goes out row by row: as one text it may be
 /// gigabytes.
 void print_trajectory_csv(std::ostream&, const OutputTable&);
-std::string events_csv(const System&, const Trajectory&);
+std::string events_csv(const std::vector<std::string>& hinges, const Trajectory&);
 
 /// Keys of summary.json.
 nlohmann::ordered_json summary_json(const RunResult&, double write_seconds);
@@ -27,6 +29,10 @@ nlohmann::ordered_json summary_json(const RunResult&, double write_seconds);
 /// vtu_step. Files of an older run in the folder are removed first, and summary.json comes last: where it is, the rest
 /// is. Returns what summary.json says. @throws InputError as write_file.
 nlohmann::ordered_json write_results(const RunResult&, const std::filesystem::path& folder);
+
+/// motion.pvd and motion_NNNNN.vtu, one grid per frame of the scene's vtu_step.
+void write_frames(const RunResult&, const std::filesystem::path& folder,
+                  const std::function<VtkGrid(size_t row)>& grid);
 
 /// motion.pvd and motion_NNNN.vtu: hub box and deformed booms in inertial axes.
 void write_motion(const RunResult&, const std::filesystem::path& folder);

@@ -8,6 +8,7 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <atomic>
 #include <charconv>
 #include <chrono>
@@ -82,7 +83,10 @@ void override_modes(Scene& scene, const std::string& text) {
     require(error == std::errc() && end == text.data() + text.size() && n >= 0,
             fmt::format("--modes: '{}' is neither a number of modes nor auto", text));
   }
+  require(std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyScene& b) { return b.is_boom(); }),
+          "--modes: this scene has no boom made from its geometry");
   for (BodyScene& b : scene.bodies) {
+    if (!b.is_boom()) continue;
     b.modes_auto = text == "auto";
     if (!b.modes_auto) b.modes = n;
   }
@@ -98,7 +102,8 @@ Scene scene_of(const RunArguments& a) {
   if (a.formulation) scene.formulation = *a.formulation;
   if (a.modes) override_modes(scene, *a.modes);
   if (a.structure)
-    for (BodyScene& b : scene.bodies) b.structure = *a.structure;
+    for (BodyScene& b : scene.bodies)
+      if (b.is_boom()) b.structure = *a.structure;
   if (a.no_budget) scene.error_budget = false;
   validate(scene);
   return scene;
@@ -140,11 +145,8 @@ nlohmann::ordered_json checked(const std::string& name) {
     return {{"body", read_body(name).name}, {"warnings", nlohmann::ordered_json::array()}, {"ok", true}};
   const Scene scene = load_scene(name);
   validate(scene);
-  return {{"scene", scene.name},
-          {"bodies", scene.bodies.size()},
-          {"hinges", scene.hinges.size()},
-          {"warnings", scene.warnings},
-          {"ok", true}};
+  return {{"scene", scene.name},           {"bodies", scene.bodies.size()}, {"hinges", scene.hinges.size()},
+          {"joints", scene.joints.size()}, {"warnings", scene.warnings},    {"ok", true}};
 }
 
 }  // namespace
@@ -190,9 +192,10 @@ int check_command(const std::string& name, const CommonOptions& common) {
       fmt::print("{}\n", found.dump(2));
     } else if (!common.quiet) {
       for (const auto& w : found["warnings"]) print_note("warning: " + w.get<std::string>());
+      const bool tree = found.value("joints", 0) > 0;
       if (found.contains("scene"))
-        fmt::print("{}: {} bodies, {} hinges: no faults\n", found["scene"].get<std::string>(),
-                   found["bodies"].get<int>(), found["hinges"].get<int>());
+        fmt::print("{}: {} bodies, {} {}: no faults\n", found["scene"].get<std::string>(), found["bodies"].get<int>(),
+                   found[tree ? "joints" : "hinges"].get<int>(), tree ? "joints" : "hinges");
       else
         fmt::print("{}: no faults\n", found["body"].get<std::string>());
     }

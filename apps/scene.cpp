@@ -3,6 +3,7 @@
 #include "apps/scene_keys.hpp"
 #include "apps/toml_reader.hpp"
 #include "fem/check.hpp"
+#include "reduction/body_file.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -259,10 +260,54 @@ BodyScene read_body_from_file(TableReader& entry, Reading& reading) {
   return body;
 }
 
-BodyScene read_body_entry(TableReader table, Reading& reading) {
-  if (table.has("file")) return read_body_from_file(table, reading);
-  BodyScene body = read_whole_body(table, reading);
-  table.reject_unknown();
+BodyScene read_rigid_body(TableReader& table, Reading& reading) {
+  BodyScene body;
+  body.name = table.text("name");
+  body.structure = "rigid";
+  body.modes = 0;
+  RigidScene rigid;
+  rigid.mass = table.number("mass");
+  rigid.inertia = read_inertia(table, "inertia", std::nullopt, reading);
+  rigid.centre = table.vector("centre", rigid.centre);
+  rigid.size = table.vector("size", rigid.size);
+  body.rigid = rigid;
+  table.reject_unknown(" (of a rigid body)");
+  return body;
+}
+
+// A file that cannot be read is a fault of the whole entry.
+BodyScene read_reduced_body(TableReader& table, Reading& reading) {
+  BodyScene body;
+  body.modes = 0;
+  const std::filesystem::path file = reading.folder / table.text("file");
+  body.reduced_file = std::filesystem::absolute(file).lexically_normal();
+  try {
+    body.reduced = std::make_shared<const ReducedBody>(flexboom::read_body_file(file));
+  } catch (const std::runtime_error& error) {
+    reading.faults.add(table.path(), table.place("file"), fmt::format("file: {}", error.what()));
+    return body;
+  }
+  body.structure = body.reduced->structure;
+  body.name = table.text("name", body.reduced->name);
+  body.damping = read_damping(table, body.damping);
+  body.stiffening = table.text("stiffening", "auto");
+  table.reject_unknown(" (of a reduced body)");
+  return body;
+}
+
+/// `in_tree`: of a scene with joints.
+BodyScene read_body_entry(TableReader table, bool in_tree, Reading& reading) {
+  if (in_tree && table.has("mass")) return read_rigid_body(table, reading);
+  if (in_tree && table.is_text("file") && table.text("file").ends_with(".h5")) return read_reduced_body(table, reading);
+  const std::string stiffening = in_tree ? table.text("stiffening", "auto") : "";
+  BodyScene body;
+  if (table.has("file")) {
+    body = read_body_from_file(table, reading);
+  } else {
+    body = read_whole_body(table, reading);
+    table.reject_unknown();
+  }
+  body.stiffening = stiffening;
   return body;
 }
 
@@ -272,21 +317,6 @@ void warn_of_rigid(const BodyScene& body, const std::string& path, bool modes_gi
 }
 
 // --- hinges ---
-
-// Directions are rounded by hand (0.70710678) or by arithmetic. What is off by no more is made orthonormal; what
-// already is so to round-off stays bit for bit, so that a scene that was written out reads back the same.
-Vector3d unit_direction(const Vector3d& v) {
-  const double error = std::abs(v.norm() - 1);
-  constexpr double round_off = 4 * std::numeric_limits<double>::epsilon();
-  return error > round_off && error <= repairable_direction ? v.normalized() : v;
-}
-
-Vector3d normal_to(const Vector3d& outward, const Vector3d& stowed) {
-  const double cosine = std::abs(outward.dot(stowed));
-  constexpr double round_off = 8 * std::numeric_limits<double>::epsilon();
-  if (!(cosine > round_off && cosine <= repairable_direction)) return outward;
-  return (outward - outward.dot(stowed) * stowed).normalized();
-}
 
 double read_stiffness(TableReader& table, double threshold) {
   const bool has_P1 = table.has("P1"), has_stiffness = table.has("stiffness");
@@ -340,6 +370,8 @@ OrbitScene read_orbit(TableReader table) {
   OrbitScene orbit;
   orbit.altitude = table.number("altitude", orbit.altitude);
   orbit.inclination = table.number("inclination", orbit.inclination);
+  orbit.gravity = table.text("gravity", orbit.gravity);
+  orbit.J2 = table.boolean("J2", orbit.J2);
   table.reject_unknown();
   return orbit;
 }
@@ -368,21 +400,36 @@ Scene read_whole_scene(TableReader& table, Reading& reading) {
   scene.duration = table.number("duration", scene.duration);
   scene.output_step = table.number("output_step", scene.output_step);
   scene.vtu_step = table.number("vtu_step", scene.vtu_step);
+  const bool in_tree = table.has("joints");
   if (auto accuracy = table.table("accuracy")) read_accuracy(*accuracy, scene);
   if (auto integrator = table.table("integrator")) read_integrator(*integrator, scene);
   if (auto orbit = table.table("orbit")) scene.orbit = read_orbit(*orbit);
-  if (auto hub = table.table("hub", true)) scene.hub = read_hub(*hub, reading);
+  if (auto hub = table.table("hub", !in_tree)) scene.hub = read_hub(*hub, reading);
   if (auto initial = table.table("initial")) read_initial(*initial, scene);
   for (TableReader& body : table.tables("bodies")) {
-    scene.bodies.push_back(read_body_entry(body, reading));
+    scene.bodies.push_back(read_body_entry(body, in_tree, reading));
     warn_of_rigid(scene.bodies.back(), body.path("modes"), body.has("modes"), reading.warnings);
   }
   for (TableReader& hinge : table.tables("hinges")) scene.hinges.push_back(read_hinge(hinge));
+  if (in_tree) read_tree(table, scene);
   table.reject_unknown();
   return scene;
 }
 
 }  // namespace
+
+Vector3d unit_direction(const Vector3d& v) {
+  const double error = std::abs(v.norm() - 1);
+  constexpr double round_off = 4 * std::numeric_limits<double>::epsilon();
+  return error > round_off && error <= repairable_direction ? v.normalized() : v;
+}
+
+Vector3d normal_to(const Vector3d& direction, const Vector3d& unit) {
+  const double cosine = std::abs(direction.dot(unit));
+  constexpr double round_off = 8 * std::numeric_limits<double>::epsilon();
+  if (!(cosine > round_off && cosine <= repairable_direction)) return direction;
+  return (direction - direction.dot(unit) * unit).normalized();
+}
 
 double OrbitScene::rate() const {
   constexpr double mu = 3.986004418e14;     // [m^3/s^2], WGS 84

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "apps/tree_scene.hpp"
 #include "dynamics/hinge.hpp"
 #include "fem/solid_boom.hpp"
 #include "reduction/reduced_body.hpp"
@@ -7,13 +8,23 @@
 #include <Eigen/Core>
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace flexboom {
 
-/// A flexible boom as a file describes it (format "flexboom-body-1", or a [[bodies]] entry of a scene).
+/// A rigid body of a scene with joints.
+struct RigidScene {
+  double mass = 0;                                    // [kg]
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // about its mass centre, BRF axes [kg m^2]
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   // BRF [m]
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();     // box about the mass centre, for pictures [m]
+};
+
+/// A flexible boom as a file describes it (format "flexboom-body-1", or a [[bodies]] entry of a scene). In a scene with
+/// joints a body may also be rigid, or reduced before.
 struct BodyScene {
   std::string name;
   std::string structure =
@@ -27,6 +38,13 @@ struct BodyScene {
   SolidOptions solid;            // [solid], how structure = "solid" is meshed
   DampingRule damping;           // none by default
   std::string backend = "auto";  // eigen-solver: ARPACK for beams, blocks for large solids
+
+  // Of a scene with joints.
+  std::string stiffening;                      // geometric: "auto", "on", "off"; empty: not part of the equations
+  std::optional<RigidScene> rigid;             // instead of a geometry; structure is "rigid"
+  std::shared_ptr<const ReducedBody> reduced;  // instead of a geometry; structure is that of the file
+  std::filesystem::path reduced_file;          // where `reduced` is from, absolute
+  bool is_boom() const { return !rigid && !reduced; }
 };
 
 /// A rigid hub. Inertia about its mass centre, which is the origin of its BRF.
@@ -44,12 +62,14 @@ struct HingeScene {
   double start_rate = 0;   // [rad/s]
 };
 
-/// Circular orbit of the reference point: for attitude in the local-vertical local-horizontal frame (x along the
-/// velocity, z to the Earth).
+/// Orbit of the reference point, circular at t = 0: for attitude in the local-vertical local-horizontal frame (x along
+/// the velocity, z to the Earth), with which the hub's axes are aligned at t = 0, and for gravity.
 struct OrbitScene {
-  double altitude = 405e3;  // above the equatorial radius [m]
-  double inclination = 0;   // [rad]
-  double rate() const;      // mean motion [rad/s]
+  double altitude = 405e3;       // above the equatorial radius [m]
+  double inclination = 0;        // [rad]
+  std::string gravity = "none";  // "none", or "differential": that on the bodies less that on the reference point
+  bool J2 = false;               // oblateness of the Earth, in the orbit and in the gravity
+  double rate() const;           // mean motion [rad/s]
 };
 
 /// Everything `flexboom run` needs. Defaults are the values a file may leave out.
@@ -71,6 +91,15 @@ struct Scene {
   std::optional<OrbitScene> orbit;
   std::vector<BodyScene> bodies;
   std::vector<HingeScene> hinges;
+
+  // With [[joints]] the scene is a tree of bodies; hub, hinges, orbit and the start of the hub are then not used.
+  bool is_tree = false;
+  std::vector<JointScene> joints;
+  std::vector<SpringScene> springs;
+  std::vector<LoadScene> loads;
+  std::vector<WheelScene> wheels;
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // inertial axes [m/s^2]
+
   std::vector<std::string> warnings;  // what was repaired or is odd (e.g. an inertia that is not symmetric)
 };
 

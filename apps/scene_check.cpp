@@ -1,4 +1,5 @@
 #include "apps/scene.hpp"
+#include "apps/scene_checks.hpp"
 #include "apps/scene_keys.hpp"
 #include "dynamics/integrator.hpp"
 #include "fem/check.hpp"
@@ -18,17 +19,13 @@
 // then the fault is reported at the value that is NaN, once.
 
 namespace flexboom {
-namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using scene_keys::Dimension;
 using toml_reader::Faults;
 
-constexpr double round_off = 1e-12;   // relative
-constexpr double max_rows = 1e6;      // of trajectory.csv
-constexpr int max_modes = 10000;      // per body; more is a typing error
-constexpr int max_elements = 100000;  // per segment; as make_mesh
+namespace scene_checks {
 
 std::string join(const std::string& path, std::string_view key) {
   return path.empty() ? std::string(key) : fmt::format("{}.{}", path, key);
@@ -52,26 +49,12 @@ void check_finite(Faults& faults, const std::string& path, const Vector3d& v) {
     faults.add(path, fmt::format("is [{}, {}, {}]; every entry must be a finite number", v.x(), v.y(), v.z()));
 }
 
-template <class Names>
-void check_name_among(Faults& faults, const std::string& path, const std::string& value, const Names& names) {
-  if (std::find(names.begin(), names.end(), value) == names.end())
-    faults.add(path, toml_reader::not_among(value, names));
+void check_unit(Faults& faults, const std::string& path, const Vector3d& v) {
+  if (!(std::abs(v.norm() - 1) <= round_off))
+    faults.add(path,
+               fmt::format("is [{}, {}, {}] of length {}; it must be a unit vector", v.x(), v.y(), v.z(), v.norm()));
 }
 
-template <class Table>
-std::vector<std::string_view> names_of(const Table& table) {
-  std::vector<std::string_view> names;
-  for (const auto& row : table) names.push_back(row.name);
-  return names;
-}
-
-std::vector<std::string_view> backend_names() {
-  std::vector<std::string_view> names = names_of(eigen_backends());
-  names.push_back("auto");
-  return names;
-}
-
-// A name becomes part of column names and file names.
 void check_name(Faults& faults, const std::string& path, const std::string& name) {
   const auto allowed = [](unsigned char c) { return (c < 0x80 && std::isalnum(c)) || c == '_' || c == '-'; };
   if (name.empty() || !std::all_of(name.begin(), name.end(), allowed)) {
@@ -80,7 +63,6 @@ void check_name(Faults& faults, const std::string& path, const std::string& name
   }
 }
 
-/// Symmetric, positive definite (or, where a point mass is allowed, not negative), triangle inequality.
 void check_inertia(Faults& faults, const std::string& path, const Matrix3d& inertia, bool may_vanish) {
   if (!inertia.allFinite()) return faults.add(path, "has an entry that is not finite; give 9 or 3 finite numbers");
   const double scale = inertia.cwiseAbs().maxCoeff();
@@ -100,6 +82,29 @@ void check_inertia(Faults& faults, const std::string& path, const Matrix3d& iner
   if (I(2) > (I(0) + I(1)) * (1 + round_off)) {
     faults.add(path, fmt::format("breaks the triangle inequality: {}; none can exceed the sum of the others", moments));
   }
+}
+
+}  // namespace scene_checks
+
+namespace {
+
+using namespace scene_checks;
+
+constexpr double max_rows = 1e6;      // of trajectory.csv
+constexpr int max_modes = 10000;      // per body; more is a typing error
+constexpr int max_elements = 100000;  // per segment; as make_mesh
+
+template <class Table>
+std::vector<std::string_view> names_of(const Table& table) {
+  std::vector<std::string_view> names;
+  for (const auto& row : table) names.push_back(row.name);
+  return names;
+}
+
+std::vector<std::string_view> backend_names() {
+  std::vector<std::string_view> names = names_of(eigen_backends());
+  names.push_back("auto");
+  return names;
 }
 
 // --- bodies ---
@@ -331,6 +336,7 @@ void check_accuracy(Faults& faults, const Scene& scene) {
   for (const BodyScene& body : scene.bodies) {
     for (const char* of_body : {".angle", ".rate", ".q", ".tip"}) known.push_back(body.name + of_body);
   }
+  if (scene.is_tree) known = tree_outputs(scene);
   const std::vector<std::string_view> names(known.begin(), known.end());
   if (!body_names_known(faults, scene)) return;
   for (const std::string& output : scene.outputs) check_name_among(faults, "accuracy.outputs", output, names);
@@ -338,7 +344,8 @@ void check_accuracy(Faults& faults, const Scene& scene) {
 
 void check_integrator(Faults& faults, const Scene& scene) {
   std::vector<std::string_view> methods = {"auto"};
-  for (const IntegratorMethod& m : integrator_methods()) methods.push_back(m.name);
+  for (const IntegratorMethod& m : integrator_methods())
+    if (!scene.is_tree || m.name != IntegratorOptions{}.method) methods.push_back(m.name);  // that one knows hubs only
   check_name_among(faults, "integrator.method", scene.integrator, methods);
   if (scene.formulation == "multipliers") {
     faults.add("integrator.formulation", "\"multipliers\" is not available in this version; it must be \"relative\"");
@@ -378,17 +385,13 @@ void check_orbit(Faults& faults, const OrbitScene& orbit) {
   if (!(std::abs(orbit.inclination) <= std::numbers::pi)) {
     faults.add("orbit.inclination", fmt::format("is {} rad; it must lie between -pi and pi", orbit.inclination));
   }
+  if (orbit.gravity != "none" && orbit.gravity != "differential")
+    faults.add("orbit.gravity", fmt::format("is \"{}\"; there are \"none\" and \"differential\"", orbit.gravity));
 }
 
 void check_directions(Faults& faults, const std::string& path, const Hinge& hinge) {
-  const auto check_unit = [&](std::string_view key, const Vector3d& v) {
-    if (!(std::abs(v.norm() - 1) <= round_off)) {
-      faults.add(join(path, key),
-                 fmt::format("is [{}, {}, {}] of length {}; it must be a unit vector", v.x(), v.y(), v.z(), v.norm()));
-    }
-  };
-  check_unit("stowed", hinge.stowed);
-  check_unit("outward", hinge.outward);
+  check_unit(faults, join(path, "stowed"), hinge.stowed);
+  check_unit(faults, join(path, "outward"), hinge.outward);
   const double cosine = hinge.stowed.dot(hinge.outward);
   if (std::abs(cosine) > round_off && faults.clean(join(path, "stowed"))) {
     faults.add(join(path, "outward"),
@@ -412,6 +415,7 @@ void check_hinge(Faults& faults, const std::string& path, const HingeScene& hing
 
 void check_body_names(Faults& faults, const Scene& scene) {
   std::set<std::string> taken = {"hub", "lvlh", "energy"};  // first words of other columns
+  if (scene.is_tree) taken = {"energy", std::string(scene_keys::ground)};
   for (size_t i = 0; i < scene.bodies.size(); ++i) {
     const std::string& name = scene.bodies[i].name;
     if (!taken.insert(name).second) {
@@ -464,10 +468,31 @@ void check_connections(Faults& faults, const Scene& scene) {
   }
 }
 
+void check_rigid(Faults& faults, const std::string& path, const RigidScene& body) {
+  check_positive(faults, join(path, "mass"), body.mass, " kg");
+  check_inertia(faults, join(path, "inertia"), body.inertia, true);
+  check_finite(faults, join(path, "centre"), body.centre);
+  for (int i = 0; i < 3; ++i) check_not_negative(faults, join(path, "size"), body.size(i), " m");
+}
+
+void check_stiffening(Faults& faults, const std::string& path, const BodyScene& body) {
+  check_name_among(faults, join(path, "stiffening"), body.stiffening, scene_keys::stiffenings);
+  if (body.stiffening != "on") return;
+  const bool without = body.structure == "eq14" || (body.reduced && body.reduced->Kg.spin.empty());
+  if (without)
+    faults.add(join(path, "stiffening"), body.reduced
+                                             ? "is \"on\", but the file has no geometric stiffness; make it anew with "
+                                               "`flexboom reduce`, or say \"off\""
+                                             : "is \"on\", but structure \"eq14\" has none; use \"beam\", or \"off\"");
+}
+
 }  // namespace
 
 void check_body(const BodyScene& body, const std::string& path, Faults& faults) {
   check_name(faults, join(path, "name"), body.name);
+  if (!body.stiffening.empty()) check_stiffening(faults, path, body);
+  if (body.rigid) return check_rigid(faults, path, *body.rigid);
+  if (body.reduced || !body.reduced_file.empty()) return check_damping(faults, join(path, "damping"), body.damping);
   if (body.structure == "solid" && !path.empty()) {
     faults.add(
         join(path, "structure"),
@@ -491,13 +516,15 @@ void check_scene(const Scene& scene, Faults& faults) {
   check_name(faults, "name", scene.name);  // the results folder is called so
   check_times(faults, scene);
   check_integrator(faults, scene);
-  check_hub(faults, scene);
+  if (!scene.is_tree) check_hub(faults, scene);
   if (scene.orbit) check_orbit(faults, *scene.orbit);
+  if (scene.orbit && scene.orbit->gravity != "none" && scene.hub.fixed)
+    faults.add("orbit.gravity", "acts on bodies that fly, but hub.fixed is true; drop one of them");
   for (size_t i = 0; i < scene.bodies.size(); ++i) check_body(scene.bodies[i], fmt::format("bodies[{}]", i), faults);
   for (size_t i = 0; i < scene.hinges.size(); ++i) check_hinge(faults, fmt::format("hinges[{}]", i), scene.hinges[i]);
   check_body_names(faults, scene);
   check_accuracy(faults, scene);
-  check_connections(faults, scene);
+  scene.is_tree ? check_tree(scene, faults) : check_connections(faults, scene);
 }
 
 void validate(const Scene& scene) {

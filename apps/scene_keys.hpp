@@ -22,6 +22,10 @@ inline constexpr std::array<std::string_view, 2> theories = {"euler-bernoulli", 
 inline constexpr std::array<std::string_view, 2> shear_rules = {"cowper", "nu-squared"};        // or a number
 inline constexpr std::array<std::string_view, 4> damping_rules = {"none", "modal", "loss-factor", "rayleigh"};
 
+inline constexpr std::array<std::string_view, 3> stiffenings = {"auto", "on", "off"};
+inline constexpr std::array<std::string_view, 2> load_axes = {"body", "inertial"};
+inline constexpr std::string_view ground = "ground";  // the inertial frame as a body
+
 /// A dimension of a cross-section [m, m^2, m^4, -].
 struct Dimension {
   std::string_view key;
@@ -68,5 +72,17 @@ struct BodyScene;
 /// empty path) of a body file.
 void check_scene(const Scene&, toml_reader::Faults&);
 void check_body(const BodyScene&, const std::string& path, toml_reader::Faults&);
+
+/// Joints, springs, loads, wheels and gravity: reading (apps/tree_scene_reader.cpp) and checking.
+void read_tree(toml_reader::TableReader&, Scene&);
+void check_tree(const Scene&, toml_reader::Faults&);
+
+/// Columns of a scene with joints, a vector being one output: "arm.angle", "arm.q", "arm.tip".
+std::vector<std::string> tree_outputs(const Scene&);
+
+/// A direction rounded by hand or by arithmetic is made a unit vector; one that is so to round-off stays bit for bit,
+/// so that a scene that was written out reads back the same.
+Eigen::Vector3d unit_direction(const Eigen::Vector3d&);
+Eigen::Vector3d normal_to(const Eigen::Vector3d& direction, const Eigen::Vector3d& unit);
 
 }  // namespace flexboom

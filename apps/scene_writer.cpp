@@ -1,55 +1,15 @@
 #include "apps/scene.hpp"
 #include "apps/scene_keys.hpp"
+#include "apps/toml_writer.hpp"
 
 #include <fmt/format.h>
-
-#include <cmath>
-#include <type_traits>
 
 namespace flexboom {
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 using scene_keys::Dimension;
-
-// The shortest decimal that reads back to the same double, always recognisable as a float.
-std::string toml(double value) {
-  std::string text = fmt::format("{}", value);
-  if (text.find_first_of(".ein") == std::string::npos) text += ".0";
-  return text;
-}
-std::string toml(bool value) { return value ? "true" : "false"; }
-std::string toml(int value) { return fmt::format("{}", value); }
-std::string toml(const std::string& value) { return toml_reader::quoted(value); }
-std::string toml(std::string_view value) { return toml_reader::quoted(value); }
-std::string toml(const Vector3d& v) { return fmt::format("[{}, {}, {}]", toml(v.x()), toml(v.y()), toml(v.z())); }
-std::string toml(const Matrix3d& m) {
-  const auto row = [&m](int i) { return toml(Vector3d(m.row(i))); };
-  return fmt::format("[\n  {},\n  {},\n  {},\n]", row(0), row(1), row(2));
-}
-std::string toml(const std::vector<std::string>& values) {
-  std::string text = "[";
-  for (const std::string& value : values) text += (text.size() > 1 ? ", " : "") + toml(value);
-  return text + "]";
-}
-
-class Writer {
- public:
-  void table(const char* header) { text_ += fmt::format("\n{}\n", header); }
-
-  template <class T>
-  void key(std::string_view name, const T& value, const char* comment = "") {
-    text_ += fmt::format("{} = {}{}{}\n", name, toml(value), *comment ? "  # " : "", comment);
-  }
-
-  void raw(std::string_view name, const std::string& value) { text_ += fmt::format("{} = {}\n", name, value); }
-
-  std::string text() && { return std::move(text_); }
-
- private:
-  std::string text_;
-};
+using toml_writer::toml;
+using toml_writer::Writer;
 
 std::string inline_dimensions(SectionShape shape) {
   std::string text;
@@ -80,10 +40,28 @@ void write_attachment(Writer& out, const RigidAttachment& attachment) {
   out.key("offset", attachment.offset, "m");
 }
 
+std::string inline_damping(const DampingRule& damping) {
+  return fmt::format("{{ rule = {}, value = {}, alpha = {}, beta = {} }}", toml(damping.name), toml(damping.value),
+                     toml(damping.alpha), toml(damping.beta));
+}
+
 void write_body(Writer& out, const BodyScene& body) {
   const BeamGeometry& boom = body.geometry;
   out.table("[[bodies]]");
   out.key("name", body.name);
+  if (body.rigid) {
+    out.key("mass", body.rigid->mass, "kg");
+    out.key("inertia", body.rigid->inertia, "kg m^2, about its mass centre");
+    out.key("centre", body.rigid->centre, "m");
+    out.key("size", body.rigid->size, "m");
+    return;
+  }
+  if (!body.stiffening.empty()) out.key("stiffening", body.stiffening);
+  if (body.reduced) {
+    out.key("file", body.reduced_file.string());
+    out.raw("damping", inline_damping(body.damping));
+    return;
+  }
   out.key("structure", body.structure);
   out.key("clamp", body.clamp);
   out.raw("modes", body.modes_auto ? "\"auto\"" : toml(body.modes));
@@ -93,9 +71,7 @@ void write_body(Writer& out, const BodyScene& body) {
   out.key("rotary_inertia", boom.rotary_inertia);
   out.key("order", boom.order);
   out.key("backend", body.backend);
-  const DampingRule& damping = body.damping;
-  out.raw("damping", fmt::format("{{ rule = {}, value = {}, alpha = {}, beta = {} }}", toml(damping.name),
-                                 toml(damping.value), toml(damping.alpha), toml(damping.beta)));
+  out.raw("damping", inline_damping(body.damping));
   for (const BeamSegment& segment : boom.segments) write_segment(out, segment);
   for (const RigidAttachment& attachment : boom.attachments) write_attachment(out, attachment);
 }
@@ -123,6 +99,7 @@ void write_settings(Writer& out, const Scene& scene) {
   out.key("duration", scene.duration, "s");
   out.key("output_step", scene.output_step, "s");
   out.key("vtu_step", scene.vtu_step, "s; 0: no VTU files");
+  if (scene.is_tree) out.key("gravity", scene.gravity, "m/s^2");
   out.table("[accuracy]");
   out.key("tolerance", scene.tolerance);
   out.key("outputs", scene.outputs, scene.outputs.empty() ? "all" : "");
@@ -139,10 +116,17 @@ void write_settings(Writer& out, const Scene& scene) {
 std::string to_toml(const Scene& scene) {
   Writer out;
   write_settings(out, scene);
+  if (scene.is_tree) {
+    for (const BodyScene& body : scene.bodies) write_body(out, body);
+    write_tree(out, scene);
+    return std::move(out).text();
+  }
   if (scene.orbit) {
     out.table("[orbit]");
     out.key("altitude", scene.orbit->altitude, "m");
     out.key("inclination", scene.orbit->inclination, "rad");
+    out.key("gravity", scene.orbit->gravity);
+    out.key("J2", scene.orbit->J2);
   }
   out.table("[hub]");
   out.key("mass", scene.hub.mass, "kg");

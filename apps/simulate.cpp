@@ -1,10 +1,12 @@
 #include "apps/simulate.hpp"
 
 #include "apps/error_budget.hpp"
+#include "apps/tree_flight.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
 #include "reduction/eq14.hpp"
+#include "reduction/geometric_stiffness.hpp"
 
 #include <fmt/format.h>
 
@@ -36,6 +38,14 @@ PreparedBody prepare_eq14(const BodyScene& b) {
   return r;
 }
 
+/// Where loads act for geometric stiffness.
+std::vector<std::string> moving_markers(const ReducedBody& body, const Mesh& mesh) {
+  std::vector<std::string> names;
+  for (const Marker& m : body.markers)
+    if (mesh.node_sets.contains(m.name) && m.S.norm() > 0) names.push_back(m.name);
+  return names;
+}
+
 PreparedBody prepare_beam(const BodyScene& b, int refine) {
   BeamGeometry geometry = b.geometry;
   constexpr int highest = 12;
@@ -61,6 +71,8 @@ PreparedBody prepare_beam(const BodyScene& b, int refine) {
   }
   r.body = reduce(mesh, assembly, basis, b.name);
   r.checks = check_invariants(r.body, mesh, assembly, basis);
+  if (!b.stiffening.empty() && r.body.n() > 0)
+    r.body.Kg = geometric_stiffness(mesh, assembly, clamp, basis.Phi, {.markers = moving_markers(r.body, mesh)});
   r.eigen = basis.summary;
   r.elements = static_cast<int>(mesh.elements.size());
   r.dofs = basis.unknowns;
@@ -71,6 +83,8 @@ PreparedBody prepare_beam(const BodyScene& b, int refine) {
 }  // namespace
 
 PreparedBody prepare_body(const BodyScene& b, int refine) {
+  if (b.rigid) return prepare_rigid(b);
+  if (b.reduced) return prepare_reduced(b);
   require(
       b.structure == "eq14" || b.structure == "beam" || b.structure == "rigid",
       fmt::format("body {}: structure '{}' is not available; there are: 'beam', 'eq14', 'rigid'", b.name, b.structure));
@@ -83,7 +97,33 @@ PreparedBody prepare_body(const BodyScene& b, int refine) {
   return r;
 }
 
+namespace {
+
+/// The reference point's orbit, in the axes that the hub has at t = 0: those of the LVLH frame.
+Orbit orbit_of(const Scene& scene) {
+  Planet earth;
+  if (scene.orbit->J2) earth.J2 = earth_J2;
+  const Orbit orbit(circular_orbit(scene.orbit->altitude, scene.orbit->inclination, earth), earth, scene.duration);
+  return orbit.in_axes(lvlh_frame(earth, orbit.at(0)).axes);
+}
+
+/// Where the mass centre of all bodies lies from the hub's origin, hub axes.
+Vector3d mass_centre(const System& system, const State& s) {
+  double m = system.hub().m;
+  Vector3d moment = system.hub().mc0;
+  for (size_t i = 0; i < system.appendages().size(); ++i) {
+    const Appendage& a = system.appendages()[i];
+    m += a.body.m;
+    moment += a.body.m * a.hinge.point + system.boom_to_hub(static_cast<int>(i), s.angle[i]) * a.body.mc0;
+  }
+  return moment / m;
+}
+
+}  // namespace
+
 Flyable make_system(const Scene& scene, const std::vector<PreparedBody>& bodies) {
+  require(!scene.is_tree,
+          fmt::format("scene {} has joints; only scenes of one hub with hinges can do this", scene.name));
   // A hub that does not move needs no mass.
   ReducedBody hub =
       scene.hub.fixed ? ReducedBody{} : rigid_body("hub", scene.hub.mass, Vector3d::Zero(), scene.hub.inertia);
@@ -97,8 +137,12 @@ Flyable make_system(const Scene& scene, const std::vector<PreparedBody>& bodies)
     appendages.back().hinge.name = p.body.name;
     angles.push_back(h->start_angle);
   }
-  System system(std::move(hub), std::move(appendages), scene.hub.fixed);
+  const bool in_field = scene.orbit && scene.orbit->gravity == "differential";
+  std::optional<OrbitalField> field;
+  if (in_field) field = OrbitalField{orbit_of(scene)};
+  System system(std::move(hub), std::move(appendages), scene.hub.fixed, std::move(field));
   State start = system.at_rest(angles);
+  if (in_field) start.position = -mass_centre(system, start);  // the mass centre follows the orbit
   start.omega = scene.start_rate;
   start.velocity = scene.start_velocity;
   for (size_t i = 0; i < bodies.size(); ++i)
@@ -110,15 +154,9 @@ Flyable make_system(const Scene& scene, const std::vector<PreparedBody>& bodies)
 
 namespace {
 
-/// Roll, pitch, yaw (3-2-1: yaw about z, then pitch about y, then roll about x) of the hub against the local-vertical
-/// local-horizontal frame: x along the velocity, y against the orbit normal, z to the Earth. At t = 0 the start
-/// attitude is aligned with it; it turns at -n about its y.
-Vector3d lvlh_angles(const Vector3d& rotation, double n, double t) {
-  const double angle = rotation.norm();
-  const Matrix3d A = angle > 0 ? Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix() : Matrix3d::Identity();
-  const Matrix3d frame = Eigen::AngleAxisd(-n * t, Vector3d::UnitY()).toRotationMatrix();
-  const Matrix3d C = frame.transpose() * A;  // hub -> LVLH
-  return {std::atan2(C(2, 1), C(2, 2)), std::asin(std::clamp(-C(2, 0), -1.0, 1.0)), std::atan2(C(1, 0), C(0, 0))};
+/// Roll, pitch, yaw of the hub against the LVLH frame.
+Vector3d lvlh_angles(const Eigen::Vector4d& attitude, const Orbit& orbit, double t) {
+  return roll_pitch_yaw(lvlh_frame(orbit.planet(), orbit.at(t)).axes.transpose() * rotation_matrix(attitude));
 }
 
 void add_vector(std::vector<std::string>& names, const std::string& stem) {
@@ -150,6 +188,8 @@ OutputTable output_table(const Scene& scene, const System& system, const Traject
   const State start = system.unpack(motion.y.front());
   Eigen::Vector4d back = start.attitude;
   back.tail<3>() *= -1;
+  std::optional<Orbit> orbit;
+  if (scene.orbit) orbit = orbit_of(scene);
   for (Eigen::Index row = 0; row < rows; ++row) {
     const auto i = static_cast<size_t>(row);
     const State s = system.unpack(motion.y[i]);
@@ -161,7 +201,7 @@ OutputTable output_table(const Scene& scene, const System& system, const Traject
     put_vector(rotation);
     put_vector(s.omega);
     put_vector(s.position - start.position);
-    if (scene.orbit) put_vector(lvlh_angles(rotation, scene.orbit->rate(), motion.time[i]));
+    if (orbit) put_vector(lvlh_angles(quaternion_product(back, s.attitude), *orbit, motion.time[i]));
     for (size_t b = 0; b < system.appendages().size(); ++b) {
       put(s.angle[b]);
       put(s.rate[b]);
@@ -242,11 +282,10 @@ double largest(const std::vector<OutputDifference>& differences) {
   return r;
 }
 
-namespace {
-
-IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks) {
+IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, std::string_view chosen,
+                                     long max_steps) {
   IntegratorOptions o;
-  o.method = scene.integrator == "auto" ? "exponential" : scene.integrator;
+  o.method = scene.integrator == "auto" ? chosen : scene.integrator;
   o.tolerance = scene.tolerance;
   o.duration = scene.duration;
   o.output_step = scene.output_step;
@@ -254,21 +293,24 @@ IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks) 
   o.rescale_at_events = scene.rescale_at_events;
   o.interrupt = hooks.interrupt;
   o.progress = hooks.progress;
+  if (max_steps > 0) o.max_steps = max_steps;
   return o;
 }
-
-}  // namespace
 
 Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_steps) {
   const Stopwatch start;
   Run r;
   for (const BodyScene& b : scene.bodies) r.bodies.push_back(prepare_body(b, refine));
+  if (scene.is_tree) {
+    const double seconds = start.seconds();
+    Run flown = fly_tree(scene, std::move(r.bodies), hooks, max_steps);
+    flown.prepare_seconds += seconds;
+    return flown;
+  }
   const Flyable f = make_system(scene, r.bodies);
   r.prepare_seconds = start.seconds();
   const Stopwatch flight;
-  IntegratorOptions options = integrator_options(scene, hooks);
-  if (max_steps > 0) options.max_steps = max_steps;
-  r.motion = integrate(f.system, f.y0, options);
+  r.motion = integrate(f.system, f.y0, integrator_options(scene, hooks, "exponential", max_steps));
   r.integrate_seconds = flight.seconds();
   r.outputs = output_table(scene, f.system, r.motion);
   return r;
@@ -286,6 +328,7 @@ std::string damping_text(const DampingRule& d) {
 void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan) {
   for (size_t i = 0; i < run.bodies.size(); ++i) {
     const BodyScene& b = scene.bodies[i];
+    if (!b.is_boom()) continue;
     const PreparedBody& p = run.bodies[i];
     const std::string model = p.body.structure == "eq14" ? "eq. 14, Euler-Bernoulli line mass, closed form"
                                                          : fmt::format("{} beam elements, order {}, {} unknowns",
@@ -299,11 +342,13 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
   plan.push_back(
       fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
                   run.motion.summary.method, scene.integrator == "auto" ? "chosen" : "as asked", scene.tolerance));
+  if (scene.is_tree) return describe_tree(scene, run, plan);
   plan.emplace_back("geometric stiffness: left out, its size is error_budget.linearisation");
   if (scene.orbit)
-    plan.push_back(
-        fmt::format("orbit: sets the LVLH frame (rate {:.6e} rad/s); gravity gradient left out, {:.1e} 1/s^2",
-                    scene.orbit->rate(), 3 * std::pow(scene.orbit->rate(), 2)));
+    plan.push_back(fmt::format("orbit: rate {:.6e} rad/s{}; differential gravity {}, {:.1e} 1/s^2", scene.orbit->rate(),
+                               scene.orbit->J2 ? ", with J2" : "",
+                               scene.orbit->gravity == "none" ? "left out" : "on every body",
+                               3 * std::pow(scene.orbit->rate(), 2)));
 }
 
 /// What a user must not overlook.
@@ -329,6 +374,7 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks) {
   Run run = run_once(r.scene, hooks);
   describe(r.scene, run, r.plan);
   r.warnings = r.scene.warnings;
+  r.warnings.insert(r.warnings.end(), run.warnings.begin(), run.warnings.end());
   // The repeats cost many times the run; a long one is not repeated.
   constexpr long worth_repeating = 2'000'000;
   const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating;
@@ -342,6 +388,7 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks) {
   }
   add_warnings(r);
   r.bodies = std::move(run.bodies);
+  r.tree = std::move(run.tree);
   r.trajectory = std::move(run.motion);
   r.outputs = std::move(run.outputs);
   r.prepare_seconds = run.prepare_seconds;

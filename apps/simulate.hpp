@@ -2,11 +2,14 @@
 
 #include "apps/scene.hpp"
 #include "dynamics/integrator.hpp"
+#include "dynamics/tree.hpp"
 #include "reduction/inertia_invariants.hpp"
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace flexboom {
@@ -44,6 +47,7 @@ struct RunResult {
   Scene scene;
   std::vector<PreparedBody> bodies;
   Trajectory trajectory;
+  std::shared_ptr<const Tree> tree;  // of a scene with joints: what was flown
   OutputTable outputs;
   ErrorBudget budget;
   std::vector<std::string> plan;  // what was chosen and why, one line each
@@ -77,7 +81,16 @@ struct Run {
   Trajectory motion;
   OutputTable outputs;
   double prepare_seconds = 0, integrate_seconds = 0;
+
+  // Of a scene with joints; the states and events of `motion` are then those of the tree, its balance is empty.
+  std::shared_ptr<const Tree> tree;
+  std::vector<double> stiffening_effect;  // per body: largest of its geometric stiffness against Ke
+  double stiffening_left_out = 0;         // the largest of those that are off
+  std::vector<std::string> warnings;
 };
+/// What a scene asks of an integrator; `chosen`: the method where it leaves the choice. `max_steps` as of run_once.
+IntegratorOptions integrator_options(const Scene&, const RunHooks&, std::string_view chosen, long max_steps);
+
 /// `max_steps` > 0 bounds its cost: NumericalError above.
 Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
 

@@ -36,6 +36,7 @@ std::string version_text() {
   line("ARPACK-NG", "3.8", "BSD-3-Clause");
   line("Spectra", fmt::format("{}.{}.{}", SPECTRA_MAJOR_VERSION, SPECTRA_MINOR_VERSION, SPECTRA_PATCH_VERSION),
        "MPL-2.0");
+  line("muParser", "", "BSD-2-Clause");
   line("SUNDIALS", SUNDIALS_VERSION, "BSD-3-Clause");
   line("CLI11", CLI11_VERSION, "BSD-3-Clause");
   line("toml++", fmt::format("{}.{}.{}", TOML_LIB_MAJOR, TOML_LIB_MINOR, TOML_LIB_PATCH), "MIT");

@@ -466,6 +466,85 @@ class RunFiles(Case):
         self.assertTrue((self.folder / "results" / "sport" / "summary.json").exists())
 
 
+class TreeScenes(Case):
+    """Scenes with joints."""
+
+    def run_scene(self, name, *arguments, out="out"):
+        folder = self.folder / out
+        self.assert_exit(OK, flexboom("run", name, "--no-budget", "--quiet", "--out", folder, *arguments))
+        return folder
+
+    def test_every_built_in_scene_flies(self):
+        for name in ("tumbling", "spin-up", "two-link-arm", "flexible-appendage", "wire-spinner", "panel-slew"):
+            folder = self.run_scene(name, "--duration", "0.2", out=name)
+            values = columns(folder / "trajectory.csv")
+            self.assertAlmostEqual(values["t"][-1], 0.2)
+            self.assertTrue(all(np.isfinite(v).all() for v in values.values()), name)
+            self.assertLess(self.summary(folder)["energy_balance"], 1e-3, name)
+
+    def test_files_and_columns(self):
+        folder = self.run_scene("flexible-appendage", "--duration", "1", "--vtu-step", "0.5", "--report")
+        vector = lambda name: [f"{name}.{a}" for a in "xyz"]
+        self.assertEqual(
+            read_csv(folder / "trajectory.csv")[0],
+            ["t", *(c for q in ("position", "velocity", "rotation", "omega") for c in vector("hub." + q)),
+             *vector("clamp.force"), *vector("clamp.torque"), *(f"panel.q{k}" for k in range(1, 7)),
+             *vector("panel.tip"), "wheel.spin",
+             *("energy." + e for e in ("kinetic", "elastic", "potential", "dissipated", "work"))])
+        self.assertEqual(read_csv(folder / "events.csv"), [["time", "hinge", "kind"]])
+        picture = meshio.read(folder / "motion_00001.vtu")
+        self.assertEqual(sorted(c.type for c in picture.cells), ["hexahedron", "line"])
+        report = (folder / "report.html").read_text()
+        self.assertIn("Elastic tip displacement", report)
+        self.assertNotIn("<canvas", report)
+        summary = self.summary(folder)
+        self.assertIn("geometric stiffness on", " ".join(summary["plan"]))
+        self.assertIsInstance(summary["momentum_drift"], float)
+        self.assertIsNone(self.summary(self.run_scene("spin-up", "--duration", "0.1", out="held"))["momentum_drift"])
+
+    def test_resolved_scene_repeats_the_run(self):
+        for name in ("two-link-arm", "panel-slew", "wire-spinner"):
+            first = self.run_scene(name, "--duration", "0.1", out=name)
+            again = self.run_scene(first / "scene.toml", out=name + "-again")
+            for file in ("trajectory.csv", "scene.toml"):
+                self.assertEqual((first / file).read_bytes(), (again / file).read_bytes(), name)
+
+    def test_warns_where_stiffening_is_off_and_counts(self):
+        scene = self.folder / "off.toml"
+        scene.write_text((MESHES / "spin-up.toml").read_text().replace("modes = 3", 'modes = 3\nstiffening = "off"'))
+        result = flexboom("run", scene, "--duration", "9", "--out", self.folder / "out")
+        self.assert_exit(OK, result)
+        self.assertIn("warning: body beam: its geometric stiffness is off", result.stderr)
+
+    def test_check(self):
+        result = flexboom("check", "two-link-arm")
+        self.assert_exit(OK, result)
+        self.assertIn("2 bodies, 2 joints: no faults", result.stdout)
+
+    def test_faults_all_at_once(self):
+        scene = self.folder / "bad.toml"
+        text = (MESHES / "two-link-arm.toml").read_text()
+        scene.write_text(text.replace('marker = "elbow"', 'marker = "elbo"').replace("drive", "driv", 1)
+                         .replace("sin(pi*t)*(t < 2)", "sin(pi*t", 2))
+        result = flexboom("check", scene)
+        self.assert_exit(INPUT, result)
+        self.assertIn('is "elbo"; did you mean "elbow"?', result.stderr)
+        self.assertIn('unknown key; did you mean "drive"?', result.stderr)
+        self.assertRegex(result.stderr, r"bad.toml:\d+:\d+: joints\[1\].drive: ")
+
+    def test_what_trees_cannot_do_is_said(self):
+        for arguments, words in ((("--integrator", "exponential"), "integrator.method"),
+                                 (("--formulation", "multipliers"), "not available"),
+                                 (("--modes", "3"), "no boom")):
+            result = flexboom("run", "tumbling", *arguments)
+            self.assert_exit(INPUT, result)
+            self.assertIn(words, result.stderr)
+        for command in (("compare", "two-link-arm"), ("bench", "transient", "tumbling")):
+            result = flexboom(*command)
+            self.assertEqual(result.returncode, INPUT, result.stderr)
+            self.assertIn("joints", result.stderr)
+
+
 class Interrupted(Case):
     def interrupt(self, kind, *arguments, after=1.0):
         process = subprocess.Popen([PROGRAM, *map(str, arguments)],

@@ -35,7 +35,7 @@ output_step = 0.1
 vtu_step = 0.5
 accuracy = { tolerance = 1e-3, outputs = ["hub.rate", "box.tip"], budget = false }
 integrator = { method = "adams", formulation = "relative", settle = 1e-7, rescale_at_events = true }
-orbit = { altitude = 5e5, inclination = 1.5 }
+orbit = { altitude = 5e5, inclination = 1.5, gravity = "differential", J2 = true }
 hub = { mass = 8.5, inertia = [0.1, 0.12, 0.05], fixed = false, size = [0.1, 0.2, 0.3] }
 initial = { rate = [0.1, -0.2, 0.3], velocity = [1, 2, 3e-3] }
 [[bodies]]
@@ -176,6 +176,8 @@ void expect_same_settings(const Scene& a, const Scene& b) {
   if (!a.orbit) return;
   EXPECT_EQ(a.orbit->altitude, b.orbit->altitude);
   EXPECT_EQ(a.orbit->inclination, b.orbit->inclination);
+  EXPECT_EQ(a.orbit->gravity, b.orbit->gravity);
+  EXPECT_EQ(a.orbit->J2, b.orbit->J2);
 }
 
 // Warnings are about what was repaired; a scene that is written out has been repaired.

@@ -1,0 +1,240 @@
+// Scenes with joints: from the scene to a tree and its flight.
+
+#include "apps/tree_flight.hpp"
+
+#include "apps/scene_keys.hpp"
+#include "fem/check.hpp"
+#include "fem/stopwatch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+PreparedBody prepare_rigid(const BodyScene& b) {
+  const RigidScene& r = *b.rigid;
+  const Matrix3d J =
+      r.inertia + r.mass * (r.centre.squaredNorm() * Matrix3d::Identity() - r.centre * r.centre.transpose());
+  PreparedBody p;
+  p.body = rigid_body(b.name, r.mass, r.mass * r.centre, J);
+  return p;
+}
+
+PreparedBody prepare_reduced(const BodyScene& b) {
+  PreparedBody p;
+  p.body = *b.reduced;
+  p.body.name = b.name;
+  p.dofs = p.body.full_freedoms;
+  p.checks = p.body.certificate;
+  if (b.damping.name != "none") apply_damping(p.body, b.damping);  // else the file's
+  return p;
+}
+
+namespace {
+
+int index_of(const Scene& scene, const std::string& body) {
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].name == body) return static_cast<int>(i);
+  throw InputError(fmt::format("there is no body \"{}\"", body));
+}
+
+Place place_of(const Scene& scene, const PlaceScene& p) {
+  Place place{.body = -1, .marker = p.marker, .position = p.point, .axes = p.axes()};
+  if (p.body.empty()) return place;
+  place.body = index_of(scene, p.body);
+  if (scene.bodies[static_cast<size_t>(place.body)].structure == "eq14" && p.marker == "root") place.marker.clear();
+  return place;
+}
+
+std::function<double(double)> negative(const std::function<double(double)>& f) {
+  return [f](double t) { return -f(t); };
+}
+
+/// The drive of a hinge or a slider: along z of both places, opposite on a.
+void add_drive(const Scene& scene, const JointScene& j, Multibody& r) {
+  const std::function<double(double)> f = course_of(j.drive, scene.duration).function.value;
+  for (const bool on_b : {true, false}) {
+    const PlaceScene& at = on_b ? j.b : j.a;
+    if (at.body.empty()) continue;
+    Load load;
+    load.name = "drive of " + j.name;
+    load.at = place_of(scene, at);
+    (j.kind == JointKind::hinge ? load.torque : load.force)[2] = on_b ? f : negative(f);
+    r.loads.push_back(std::move(load));
+  }
+}
+
+Joint joint_of(const Scene& scene, const JointScene& j) {
+  Joint joint;
+  joint.name = j.name;
+  joint.kind = j.kind;
+  joint.a = place_of(scene, j.a);
+  joint.b = place_of(scene, j.b);
+  joint.mechanism = j.mechanism;
+  joint.closes_loop = j.closes_loop;
+  for (const CourseScene& c : j.motion) joint.prescribed.push_back(course_of(c, scene.duration).function);
+  return joint;
+}
+
+Load load_of(const Scene& scene, const LoadScene& l) {
+  Load load;
+  load.name = l.name;
+  load.at = place_of(scene, l.at);
+  load.inertial_axes = l.inertial_axes;
+  for (size_t i = 0; i < 3; ++i) {
+    if (l.force[i].given()) load.force[i] = course_of(l.force[i], scene.duration).function.value;
+    if (l.torque[i].given()) load.torque[i] = course_of(l.torque[i], scene.duration).function.value;
+  }
+  return load;
+}
+
+ReactionWheel wheel_of(const Scene& scene, const WheelScene& w) {
+  ReactionWheel wheel;
+  wheel.name = w.name;
+  wheel.body = index_of(scene, w.body);
+  wheel.axis = w.axis;
+  wheel.inertia = w.inertia;
+  wheel.spin = w.spin;
+  wheel.torque = [](double) { return 0.0; };
+  if (w.torque.given()) wheel.torque = course_of(w.torque, scene.duration).function.value;
+  return wheel;
+}
+
+}  // namespace
+
+Multibody make_multibody(const Scene& scene, const std::vector<PreparedBody>& bodies) {
+  Multibody r;
+  r.gravity = scene.gravity;
+  for (const PreparedBody& p : bodies) r.bodies.push_back(p.body);
+  for (const JointScene& j : scene.joints) {
+    r.joints.push_back(joint_of(scene, j));
+    if (j.drive.given()) add_drive(scene, j, r);
+  }
+  for (const SpringScene& s : scene.springs)
+    r.springs.push_back({s.name, place_of(scene, s.a), place_of(scene, s.b), s.stiffness, s.free_length, s.damping});
+  for (const LoadScene& l : scene.loads) r.loads.push_back(load_of(scene, l));
+  for (const WheelScene& w : scene.wheels) r.wheels.push_back(wheel_of(scene, w));
+  return r;
+}
+
+TreeState start_state(const Scene& scene, const Tree& tree) {
+  TreeState s = tree.at_rest();
+  for (size_t i = 0; i < scene.joints.size(); ++i) {
+    const JointScene& j = scene.joints[i];
+    JointState& state = s.joints[i];
+    if (!j.start.empty()) state.coordinate = j.start;
+    if (!j.start_rate.empty()) state.rate = j.start_rate;
+    state.attitude = j.start_attitude.normalized();
+    state.omega = j.start_omega;
+    state.position = j.start_position;
+    state.velocity = j.start_velocity;
+  }
+  return s;
+}
+
+namespace {
+
+/// Where functions of time are not smooth. Those of an expression are not known: no step passes an output then, so that
+/// a pulse is not stepped over.
+void set_corners(const Scene& scene, IntegratorOptions& o) {
+  const auto add = [&](const CourseScene& c) {
+    if (!c.given()) return;
+    for (const double t : course_of(c, scene.duration).corners)
+      if (t > 0 && t < scene.duration) o.corners.push_back(t);
+    o.step_to_outputs = o.step_to_outputs || !c.expression.empty();
+  };
+  for (const JointScene& j : scene.joints) {
+    add(j.drive);
+    for (const CourseScene& c : j.motion) add(c);
+  }
+  for (const LoadScene& l : scene.loads)
+    for (size_t i = 0; i < 3; ++i) add(l.force[i]), add(l.torque[i]);
+  for (const WheelScene& w : scene.wheels) add(w.torque);
+  std::ranges::sort(o.corners);
+  o.corners.erase(std::ranges::unique(o.corners).begin(), o.corners.end());
+}
+
+IntegratorOptions options_of(const Scene& scene, const Multibody& bodies, const RunHooks& hooks, long max_steps) {
+  const bool elastic = std::any_of(bodies.bodies.begin(), bodies.bodies.end(), [](const auto& b) { return b.n() > 0; });
+  IntegratorOptions o = integrator_options(scene, hooks, elastic ? "bdf" : "adams", max_steps);
+  set_corners(scene, o);
+  return o;
+}
+
+bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty(); }
+
+std::vector<Stiffening> first_choice(const Scene& scene, const Multibody& bodies) {
+  const Tree plain(bodies);
+  std::vector<Stiffening> choice =
+      stiffening_where_it_counts(bodies, start_state(scene, plain), scene.duration, scene.tolerance);
+  for (size_t i = 0; i < choice.size(); ++i) {
+    if (scene.bodies[i].stiffening == "on" && bodies.bodies[i].n() > 0) choice[i] = Stiffening::on;
+    if (scene.bodies[i].stiffening == "off" || !has_stiffening(bodies.bodies[i])) choice[i] = Stiffening::off;
+  }
+  return choice;
+}
+
+/// Turns on what the flight showed to count. Was there any?
+bool revise(const Scene& scene, const Tree& tree, const TreeTrajectory& flight, std::vector<Stiffening>& choice) {
+  bool changed = false;
+  for (size_t i = 0; i < choice.size(); ++i) {
+    const bool wanted = scene.bodies[i].stiffening == "auto" && has_stiffening(tree.scene().bodies[i]) &&
+                        flight.stiffening_effect[i] > scene.tolerance;
+    if (!wanted || choice[i] == Stiffening::on) continue;
+    choice[i] = Stiffening::on;
+    changed = true;
+  }
+  return changed;
+}
+
+double stiffening_left_out(const Tree& tree, const TreeTrajectory& flight) {
+  double worst = 0;
+  for (size_t i = 0; i < flight.stiffening_effect.size(); ++i)
+    if (tree.stiffening(static_cast<int>(i)) == Stiffening::off) worst = std::max(worst, flight.stiffening_effect[i]);
+  return worst;
+}
+
+}  // namespace
+
+Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
+  const Stopwatch start;
+  const Multibody multibody = make_multibody(scene, bodies);
+  const IntegratorOptions options = options_of(scene, multibody, hooks, max_steps);
+  std::vector<Stiffening> stiffening = first_choice(scene, multibody);
+  Run r;
+  r.bodies = std::move(bodies);
+  r.prepare_seconds = start.seconds();
+  const Stopwatch flight_time;
+  TreeTrajectory flight;
+  do {
+    r.tree = std::make_shared<const Tree>(multibody, stiffening);
+    flight = integrate(*r.tree, r.tree->pack(start_state(scene, *r.tree)), options);
+  } while (!flight.summary.interrupted && revise(scene, *r.tree, flight, stiffening));
+  r.outputs = tree_output_table(scene, *r.tree, flight);
+  r.stiffening_effect = flight.stiffening_effect;
+  r.stiffening_left_out = stiffening_left_out(*r.tree, flight);
+  r.warnings = std::move(flight.warnings);
+  r.motion.time = std::move(flight.time);
+  r.motion.y = std::move(flight.y);
+  r.motion.events = std::move(flight.events);
+  r.motion.summary = std::move(flight.summary);
+  r.integrate_seconds = flight_time.seconds();
+  return r;
+}
+
+bool flies_freely(const Scene& scene) {
+  bool free = scene.gravity.isZero(0) && scene.loads.empty();
+  for (const JointScene& j : scene.joints) free = free && (!j.a.body.empty() || j.kind == JointKind::free);
+  for (const SpringScene& s : scene.springs) free = free && !s.a.body.empty() && !s.b.body.empty();
+  return free;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,38 @@
+#pragma once
+
+#include "apps/simulate.hpp"
+#include "dynamics/tree_integrator.hpp"
+
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// The bodies, joints and forces of a scene with joints. @throws InputError.
+Multibody make_multibody(const Scene&, const std::vector<PreparedBody>&);
+
+/// Start values of its joints.
+TreeState start_state(const Scene&, const Tree&);
+
+/// The boom's, rigid or reduced body of a scene with joints, with its geometric stiffness where it has one.
+PreparedBody prepare_rigid(const BodyScene&);
+PreparedBody prepare_reduced(const BodyScene&);
+
+/// One flight of a scene with joints. Geometric stiffness "auto" is on where it exceeds the tolerance at the start,
+/// under the prescribed motions, or (then the flight is repeated with it) at any output.
+/// `max_steps` > 0 bounds its cost. @throws InputError, NumericalError.
+Run fly_tree(const Scene&, std::vector<PreparedBody>, const RunHooks&, long max_steps);
+
+/// Columns of trajectory.csv.
+OutputTable tree_output_table(const Scene&, const Tree&, const TreeTrajectory&);
+
+/// What was flown, one line each.
+void describe_tree(const Scene&, const Run&, std::vector<std::string>& plan);
+
+/// Does nothing from outside push the scene, so that its momenta are kept?
+bool flies_freely(const Scene&);
+
+/// motion.pvd and motion_NNNNN.vtu: boxes of rigid bodies and deformed flexible ones, inertial axes.
+void write_tree_motion(const RunResult&, const std::filesystem::path& folder);
+
+}  // namespace flexboom

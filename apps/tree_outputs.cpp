@@ -1,0 +1,140 @@
+// Outputs of a scene with joints: columns of trajectory.csv, lines of the plan.
+
+#include "apps/tree_flight.hpp"
+#include "dynamics/rotation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace flexboom {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Puts values under their names, row by row: the first row says what the columns are.
+class Columns {
+ public:
+  Columns(OutputTable& table, Eigen::Index rows) : table_(table), rows_(rows) {}
+
+  void put(const std::string& name, double value) {
+    if (row_ == 0) {
+      table_.names.push_back(name);
+      table_.values.conservativeResize(rows_, static_cast<Eigen::Index>(table_.names.size()));
+    }
+    table_.values(row_, column_++) = value;
+  }
+  void put(const std::string& name, const Vector3d& v) {
+    put(name + ".x", v.x()), put(name + ".y", v.y()), put(name + ".z", v.z());
+  }
+  void end_row() { ++row_, column_ = 0; }
+
+ private:
+  OutputTable& table_;
+  Eigen::Index rows_, row_ = 0, column_ = 0;
+};
+
+void put_joint(Columns& out, const JointScene& joint, const JointState& s) {
+  const std::string& name = joint.name;
+  switch (joint.kind) {
+    case JointKind::fixed:
+      return;
+    case JointKind::hinge:
+      return out.put(name + ".angle", s.coordinate[0]), out.put(name + ".rate", s.rate[0]);
+    case JointKind::slider:
+      return out.put(name + ".length", s.coordinate[0]), out.put(name + ".rate", s.rate[0]);
+    case JointKind::universal:
+      out.put(name + ".angle1", s.coordinate[0]), out.put(name + ".angle2", s.coordinate[1]);
+      return out.put(name + ".rate1", s.rate[0]), out.put(name + ".rate2", s.rate[1]);
+    case JointKind::free:
+      out.put(name + ".position", s.position), out.put(name + ".velocity", s.velocity);
+      [[fallthrough]];
+    case JointKind::spherical:
+      out.put(name + ".rotation", rotation_vector(s.attitude)), out.put(name + ".omega", s.omega);
+  }
+}
+
+void put_load(Columns& out, const JointScene& joint, const JointLoad& load) {
+  out.put(joint.name + ".force", load.force), out.put(joint.name + ".torque", load.torque);
+  if (load.drive.size() == 1) out.put(joint.name + ".drive", load.drive[0]);
+  for (size_t i = 1; load.drive.size() > 1 && i <= load.drive.size(); ++i)
+    out.put(fmt::format("{}.drive{}", joint.name, i), load.drive[i - 1]);
+}
+
+/// Elastic displacement of the tip, BRF [m]: S q, and what geometric stiffness adds of second order, -1/2 q^T Kf q.
+Vector3d tip_displacement(const ReducedBody& body, const VectorXd& q, Stiffening stiffening) {
+  const auto tip =
+      std::find_if(body.markers.begin(), body.markers.end(), [](const Marker& m) { return m.name == "tip"; });
+  if (tip == body.markers.end() || q.size() == 0) return Vector3d::Zero();
+  Vector3d u = tip->S * q;
+  if (stiffening == Stiffening::off) return u;
+  for (const MarkerStiffness& k : body.Kg.markers)
+    for (size_t i = 0; k.marker == "tip" && i < k.force.size(); ++i)
+      u[static_cast<Eigen::Index>(i)] -= 0.5 * q.dot(k.force[i] * q);
+  return u;
+}
+
+std::vector<char> closed_stops(const Tree& tree, const VectorXd& y) {
+  std::vector<char> contact(tree.scene().joints.size(), 0);
+  for (const int joint : tree.stops()) contact[static_cast<size_t>(joint)] = tree.gap(y.data(), joint) > 0;
+  return contact;
+}
+
+}  // namespace
+
+OutputTable tree_output_table(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) {
+  OutputTable table;
+  Columns out(table, static_cast<Eigen::Index>(motion.time.size()));
+  const bool loads = std::any_of(scene.joints.begin(), scene.joints.end(), [](const JointScene& j) { return j.loads; });
+  for (size_t row = 0; row < motion.time.size(); ++row) {
+    const double t = motion.time[row];
+    const VectorXd& y = motion.y[row];
+    const TreeState s = tree.unpack(y);
+    const std::vector<JointLoad> load =
+        loads ? tree.joint_loads(t, y, closed_stops(tree, y)) : std::vector<JointLoad>(scene.joints.size());
+    out.put("t", t);
+    for (size_t i = 0; i < scene.joints.size(); ++i) {
+      put_joint(out, scene.joints[i], s.joints[i]);
+      if (scene.joints[i].loads) put_load(out, scene.joints[i], load[i]);
+    }
+    for (size_t b = 0; b < scene.bodies.size(); ++b) {
+      const std::string& name = scene.bodies[b].name;
+      for (Eigen::Index k = 0; k < s.q[b].size(); ++k) out.put(fmt::format("{}.q{}", name, k + 1), s.q[b][k]);
+      if (s.q[b].size() > 0)
+        out.put(name + ".tip", tip_displacement(tree.scene().bodies[b], s.q[b], tree.stiffening(static_cast<int>(b))));
+    }
+    for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name + ".spin", s.spin[w]);
+    const TreeBalance& e = motion.balance[row];
+    out.put("energy.kinetic", e.kinetic), out.put("energy.elastic", e.elastic);
+    out.put("energy.potential", e.potential), out.put("energy.dissipated", e.dissipated);
+    out.put("energy.work", e.work);
+    out.end_row();
+  }
+  return table;
+}
+
+void describe_tree(const Scene& scene, const Run& run, std::vector<std::string>& plan) {
+  for (size_t i = 0; i < scene.bodies.size(); ++i) {
+    const BodyScene& b = scene.bodies[i];
+    if (b.rigid) plan.push_back(fmt::format("{}: rigid, {:g} kg", b.name, b.rigid->mass));
+    if (b.reduced)
+      plan.push_back(fmt::format("{}: reduced body of {}, {} coordinates; its own truncation is not measured", b.name,
+                                 b.reduced_file.string(), run.bodies[i].body.n()));
+    if (run.bodies[i].body.n() == 0) continue;
+    const bool known = !run.bodies[i].body.Kg.spin.empty();
+    const bool on = run.tree->stiffening(static_cast<int>(i)) == Stiffening::on;
+    plan.push_back(known ? fmt::format("{}: geometric stiffness {} (stiffening = \"{}\"): its effect reaches {:.2g} of "
+                                       "the stiffness of the body",
+                                       b.name, on ? "on" : "off", b.stiffening, run.stiffening_effect[i])
+                         : fmt::format("{}: geometric stiffness unknown and left out ({}); its effect is not measured",
+                                       b.name, b.reduced ? "not in the file" : "structure \"eq14\""));
+  }
+  for (const JointScene& j : scene.joints)
+    plan.push_back(fmt::format("joint {}: {}, {} on {}{}", j.name, joint_type(j.kind).name, j.b.body,
+                               j.a.body.empty() ? "the inertial frame" : j.a.body,
+                               j.motion.empty() ? "" : ", motion prescribed"));
+}
+
+}  // namespace flexboom

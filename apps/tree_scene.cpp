@@ -1,0 +1,73 @@
+#include "apps/tree_scene.hpp"
+
+#include "apps/scene.hpp"
+#include "apps/scene_keys.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+
+namespace flexboom {
+
+TimeCourse course_of(const CourseScene& course, double duration) {
+  if (course.manoeuvre) return rest_to_rest(*course.manoeuvre);
+  if (!course.table) return time_expression(course.expression);
+  TimeCourse r = time_table(*course.table);
+  require(
+      r.begin <= 0 && r.end >= duration,
+      fmt::format("the table reaches from {:g} s to {:g} s, the flight from 0 to {:g} s; give more rows, or outside "
+                  "= \"hold\"",
+                  r.begin, r.end, duration));
+  // An integrator may ask a little beyond the end.
+  const auto within = [begin = r.begin, end = r.end](std::function<double(double)> f) {
+    return [begin, end, f = std::move(f)](double t) { return f(std::clamp(t, begin, end)); };
+  };
+  r.function = {within(r.function.value), within(r.function.rate), within(r.function.acceleration)};
+  return r;
+}
+
+Eigen::Matrix3d PlaceScene::axes() const {
+  Eigen::Matrix3d A;
+  A << x, z.cross(x), z;
+  return A;
+}
+
+std::vector<std::string> tree_outputs(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const JointScene& joint : scene.joints) {
+    const auto add = [&](const char* what) { names.push_back(joint.name + what); };
+    switch (joint.kind) {
+      case JointKind::fixed:
+        break;
+      case JointKind::hinge:
+        add(".angle"), add(".rate");
+        break;
+      case JointKind::slider:
+        add(".length"), add(".rate");
+        break;
+      case JointKind::universal:
+        add(".angle1"), add(".angle2"), add(".rate1"), add(".rate2");
+        break;
+      case JointKind::spherical:
+        add(".rotation"), add(".omega");
+        break;
+      case JointKind::free:
+        add(".position"), add(".velocity"), add(".rotation"), add(".omega");
+    }
+    if (joint.loads) add(".force"), add(".torque");
+    if (joint.loads && joint.motion.size() == 1) add(".drive");
+    for (size_t i = 1; joint.loads && joint.motion.size() > 1 && i <= joint.motion.size(); ++i)
+      names.push_back(fmt::format("{}.drive{}", joint.name, i));
+  }
+  for (const BodyScene& body : scene.bodies) {
+    if (body.rigid || body.structure == "rigid") continue;
+    names.push_back(body.name + ".q");
+    names.push_back(body.name + ".tip");
+  }
+  for (const WheelScene& wheel : scene.wheels) names.push_back(wheel.name + ".spin");
+  return names;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,248 @@
+// Checks of [[joints]], [[springs]], [[loads]] and [[wheels]].
+
+#include "apps/scene.hpp"
+#include "apps/scene_checks.hpp"
+#include "apps/scene_keys.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <set>
+
+namespace flexboom {
+namespace {
+
+using namespace scene_checks;
+using toml_reader::Faults;
+
+/// Markers that a place on the body may name.
+std::vector<std::string> marker_names(const BodyScene& body) {
+  if (body.rigid) return {};
+  std::vector<std::string> names;
+  if (body.reduced) {
+    for (const Marker& m : body.reduced->markers) names.push_back(m.name);
+    return names;
+  }
+  names = {"root", "tip"};
+  for (const RigidAttachment& a : body.geometry.attachments)
+    if (!a.name.empty()) names.push_back(a.name);
+  return names;
+}
+
+/// Looks up what joints, forces and wheels refer to.
+class TreeCheck {
+ public:
+  TreeCheck(const Scene& scene, Faults& faults) : scene_(scene), faults_(faults) {}
+
+  void run() {
+    if (scene_.joints.empty())
+      faults_.add("joints", "has no joint; each body hangs on one, free ones on a joint of kind \"free\"");
+    check_finite(faults_, "gravity", scene_.gravity);
+    check_names();
+    each("joints", scene_.joints, [this](const auto& path, const JointScene& j) { joint(path, j); });
+    each("springs", scene_.springs, [this](const auto& path, const SpringScene& s) { spring(path, s); });
+    each("loads", scene_.loads, [this](const auto& path, const LoadScene& l) { load(path, l); });
+    each("wheels", scene_.wheels, [this](const auto& path, const WheelScene& w) { wheel(path, w); });
+    if (faults_.clean("joints") && bodies_known()) topology();
+  }
+
+ private:
+  template <class Items, class Check>
+  void each(const char* what, const Items& items, Check check) {
+    for (size_t i = 0; i < items.size(); ++i) check(fmt::format("{}[{}]", what, i), items[i]);
+  }
+
+  bool bodies_known() const {
+    for (size_t i = 0; i < scene_.bodies.size(); ++i)
+      if (!faults_.clean(fmt::format("bodies[{}].name", i))) return false;
+    return !scene_.bodies.empty() || faults_.clean("bodies");
+  }
+
+  // A joint may have the name of the body it carries; its columns are others.
+  void check_names() {
+    const auto unique = [this](const char* what, const auto& items) {
+      std::set<std::string> taken = {"energy"};
+      each(what, items, [&](const std::string& path, const auto& item) {
+        check_name(faults_, path + ".name", item.name);
+        if (!taken.insert(item.name).second)
+          faults_.add(path + ".name", fmt::format("{} is taken; choose another", toml_reader::quoted(item.name)));
+      });
+    };
+    unique("joints", scene_.joints), unique("springs", scene_.springs), unique("loads", scene_.loads);
+    unique("wheels", scene_.wheels);
+  }
+
+  const BodyScene* body_named(const std::string& path, const std::string& name) {
+    std::vector<std::string_view> names;
+    for (const BodyScene& b : scene_.bodies) {
+      if (b.name == name) return &b;
+      names.push_back(b.name);
+    }
+    if (!bodies_known()) return nullptr;
+    names.push_back(scene_keys::ground);
+    faults_.add(path, toml_reader::not_among(name, names));
+    return nullptr;
+  }
+
+  void place(const std::string& path, const PlaceScene& p) {
+    check_finite(faults_, path + ".point", p.point);
+    check_unit(faults_, path + ".z", p.z);
+    check_unit(faults_, path + ".x", p.x);
+    if (std::abs(p.x.dot(p.z)) > round_off && faults_.clean(path + ".z"))
+      faults_.add(path + ".x", fmt::format("is not normal to z, [{}, {}, {}]; it must be", p.z.x(), p.z.y(), p.z.z()));
+    if (p.body.empty()) {
+      if (!p.marker.empty()) faults_.add(path + ".marker", "needs a body; the inertial frame has none, give a point");
+      return;
+    }
+    const BodyScene* body = body_named(path + ".body", p.body);
+    if (!body || p.marker.empty()) return;
+    const std::vector<std::string> names = marker_names(*body);
+    if (names.empty()) return faults_.add(path + ".marker", fmt::format("a rigid body has none; give a point"));
+    check_name_among(faults_, path + ".marker", p.marker, std::vector<std::string_view>(names.begin(), names.end()));
+  }
+
+  void course(const std::string& path, const CourseScene& c) {
+    if (!c.given()) return;
+    try {
+      course_of(c, scene_.duration);
+    } catch (const InputError& error) {
+      faults_.add(path, error.what());
+    }
+  }
+
+  void joint(const std::string& path, const JointScene& j) {
+    const JointType& type = joint_type(j.kind);
+    const bool scalar = type.scalars == 1;
+    place(path + ".a", j.a);
+    place(path + ".b", j.b);
+    if (j.b.body.empty())
+      faults_.add(path + ".b", "has no body; a is the place nearer to the inertial frame, b is on a body");
+    const HingeMechanism& m = j.mechanism;
+    const auto mechanism = [&](const char* key, double value) {
+      check_not_negative(faults_, path + "." + key, value, "");
+      if (value > 0 && !scalar)
+        faults_.add(path + "." + key, fmt::format("a {} joint has none; hinges and sliders have", type.name));
+    };
+    mechanism("stiffness", m.stiffness), mechanism("damping", m.damping), mechanism("stop_stiffness", m.stop_stiffness);
+    check_finite(faults_, path + ".rest", m.rest);
+    check_finite(faults_, path + ".threshold", m.threshold);
+    course(path + ".drive", j.drive);
+    if (j.drive.given() && !scalar)
+      faults_.add(path + ".drive", fmt::format("a {} joint has none; hinges and sliders have", type.name));
+    motion(path, j, type);
+    start(path, j, type);
+    if (j.closes_loop && scene_.formulation != "multipliers")
+      faults_.add(path + ".closes_loop", "is true: a loop needs [integrator] formulation = \"multipliers\"");
+  }
+
+  void motion(const std::string& path, const JointScene& j, const JointType& type) {
+    for (const CourseScene& c : j.motion) course(path + ".motion", c);
+    if (j.motion.empty()) return;
+    if (type.scalars == 0)
+      faults_.add(path + ".motion",
+                  fmt::format("a {} joint cannot be given one; hinge, slider and universal can", type.name));
+    else if (std::ssize(j.motion) != type.scalars)
+      faults_.add(path + ".motion",
+                  fmt::format("has {} functions; a {} joint needs {}", j.motion.size(), type.name, type.scalars));
+    if (j.drive.given())
+      faults_.add(path + ".drive", "is given beside motion, whose torque is an output; give one of them");
+    if (!j.start.empty() || !j.start_rate.empty())
+      faults_.add(path + (j.start.empty() ? ".start_rate" : ".start"),
+                  "is given beside motion, which says it; give one of them");
+  }
+
+  void start(const std::string& path, const JointScene& j, const JointType& type) {
+    const auto scalars = [&](const char* key, const std::vector<double>& v) {
+      for (const double x : v) check_finite(faults_, path + "." + key, x);
+      if (v.empty() || std::ssize(v) == type.scalars) return;
+      faults_.add(path + "." + key,
+                  type.scalars == 0
+                      ? fmt::format("a {} joint has start_attitude and its like, if any", type.name)
+                      : fmt::format("has {} numbers; a {} joint needs {}", v.size(), type.name, type.scalars));
+    };
+    scalars("start", j.start), scalars("start_rate", j.start_rate);
+    const auto vector = [&](const char* key, const Eigen::Vector3d& v, bool has) {
+      check_finite(faults_, path + "." + key, v);
+      if (!has && !v.isZero(0)) faults_.add(path + "." + key, fmt::format("a {} joint has none", type.name));
+    };
+    vector("start_omega", j.start_omega, type.turns);
+    vector("start_position", j.start_position, type.floats);
+    vector("start_velocity", j.start_velocity, type.floats);
+    if (!(std::abs(j.start_attitude.norm() - 1) <= 1e-6))
+      faults_.add(path + ".start_attitude",
+                  fmt::format("has length {}; a unit quaternion [w, x, y, z] has 1", j.start_attitude.norm()));
+    if (!type.turns && j.start_attitude != Eigen::Vector4d(1, 0, 0, 0))
+      faults_.add(path + ".start_attitude", fmt::format("a {} joint has none", type.name));
+  }
+
+  void spring(const std::string& path, const SpringScene& s) {
+    place(path + ".a", s.a);
+    place(path + ".b", s.b);
+    check_not_negative(faults_, path + ".stiffness", s.stiffness, " N/m");
+    check_not_negative(faults_, path + ".free_length", s.free_length, " m");
+    check_not_negative(faults_, path + ".damping", s.damping, " N s/m");
+  }
+
+  void load(const std::string& path, const LoadScene& l) {
+    place(path + ".at", l.at);
+    if (l.at.body.empty()) faults_.add(path + ".at", "has no body to act on");
+    for (const CourseScene& c : l.force) course(path + ".force", c);
+    for (const CourseScene& c : l.torque) course(path + ".torque", c);
+  }
+
+  void wheel(const std::string& path, const WheelScene& w) {
+    body_named(path + ".body", w.body);
+    check_unit(faults_, path + ".axis", w.axis);
+    check_positive(faults_, path + ".inertia", w.inertia, " kg m^2");
+    check_finite(faults_, path + ".spin", w.spin);
+    course(path + ".torque", w.torque);
+  }
+
+  /// Each body hangs on one joint, and following them leads to the inertial frame.
+  void topology() {
+    std::map<std::string, size_t> carrier;
+    for (size_t i = 0; i < scene_.joints.size(); ++i) {
+      const JointScene& j = scene_.joints[i];
+      if (j.closes_loop) continue;
+      const auto [first, only] = carrier.emplace(j.b.body, i);
+      if (!only)
+        faults_.add(fmt::format("joints[{}].b", i),
+                    fmt::format("body {} hangs on joint {} already: this one closes a loop; it may start from another "
+                                "body, or say closes_loop = true",
+                                toml_reader::quoted(j.b.body), toml_reader::quoted(scene_.joints[first->second].name)));
+    }
+    for (size_t i = 0; i < scene_.bodies.size(); ++i) {
+      const std::string& name = scene_.bodies[i].name;
+      if (!carrier.contains(name)) {
+        faults_.add(
+            fmt::format("bodies[{}]", i),
+            fmt::format("{} hangs on no joint; if it flies, give it one of kind \"free\"", toml_reader::quoted(name)));
+      } else if (!leads_home(name, carrier)) {
+        faults_.add(fmt::format("joints[{}].a", carrier[name]),
+                    fmt::format("body {} hangs on itself in a circle of joints; one of them must start from the "
+                                "inertial frame",
+                                toml_reader::quoted(name)));
+      }
+    }
+  }
+
+  bool leads_home(std::string name, const std::map<std::string, size_t>& carrier) const {
+    for (size_t step = 0; step <= scene_.joints.size(); ++step) {
+      if (name.empty()) return true;
+      const auto joint = carrier.find(name);
+      if (joint == carrier.end()) return true;  // reported elsewhere
+      name = scene_.joints[joint->second].a.body;
+    }
+    return false;
+  }
+
+  const Scene& scene_;
+  Faults& faults_;
+};
+
+}  // namespace
+
+void check_tree(const Scene& scene, Faults& faults) { TreeCheck(scene, faults).run(); }
+
+}  // namespace flexboom

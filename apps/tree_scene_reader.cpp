@@ -1,0 +1,225 @@
+// [[joints]], [[springs]], [[loads]], [[wheels]]: from the file to a Scene.
+
+#include "apps/scene.hpp"
+#include "apps/scene_keys.hpp"
+
+#include <fmt/format.h>
+
+#include <limits>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Vector3d;
+using toml_reader::TableReader;
+using toml_reader::Value;
+
+const Value* value_at(TableReader& table, std::string_view key) {
+  if (!table.has(key)) return nullptr;
+  for (const auto& [name, value] : table.value().entries)
+    if (name == key) return &value;
+  return nullptr;
+}
+
+bool is_number(const Value& v) { return v.kind == Value::Kind::number || v.kind == Value::Kind::integer; }
+
+/// Numbers of a key: one, or an array of them. Absent: empty.
+std::vector<double> numbers(TableReader& table, std::string_view key) {
+  const Value* value = value_at(table, key);
+  if (!value) return {};
+  if (is_number(*value)) return {value->number};
+  std::vector<double> result;
+  bool good = value->kind == Value::Kind::array;
+  for (const Value& item : value->items) {
+    good = good && is_number(item);
+    result.push_back(item.number);
+  }
+  if (!good) table.fault(key, "must be a number or an array of numbers");
+  return result;
+}
+
+CourseScene read_course_table(TableReader table) {
+  CourseScene course;
+  if (table.has("angle")) {
+    Manoeuvre m;
+    m.profile = table.text("profile", m.profile);
+    m.angle = table.number("angle");
+    m.peak_rate = table.number("peak_rate");
+    m.peak_acceleration = table.number("peak_acceleration");
+    m.start = table.number("start", m.start);
+    course.manoeuvre = m;
+    table.reject_unknown(" (of a turn from rest to rest)");
+    return course;
+  }
+  TimeTable t;
+  t.interpolation = table.text("interpolation", t.interpolation);
+  t.outside = table.text("outside", t.outside);
+  t.time = numbers(table, "time");
+  t.value = numbers(table, "value");
+  for (const char* key : {"time", "value"})
+    if (!table.has(key))
+      table.fault(key,
+                  "is missing; a function of time is an expression, { time, value } or { angle, "
+                  "peak_rate, peak_acceleration }");
+  course.table = t;
+  table.reject_unknown(" (of a table over time)");
+  return course;
+}
+
+constexpr const char* what_a_course_is =
+    "must be a number, an expression of t or a table { time = [...], value = [...] }";
+
+/// `item` is the value of `key`, or an entry of it.
+CourseScene read_course(TableReader& table, std::string_view key, const Value& item) {
+  CourseScene course;
+  if (is_number(item)) {
+    course.expression = fmt::format("{}", item.number);
+  } else if (item.kind == Value::Kind::text) {
+    course.expression = item.text;
+    if (item.text.empty()) table.fault(key, "is empty; it must be an expression of t");
+  } else if (item.kind == Value::Kind::table && &item == value_at(table, key)) {
+    return read_course_table(*table.table(key));
+  } else {
+    table.fault(key, what_a_course_is);
+  }
+  return course;
+}
+
+CourseScene read_course(TableReader& table, std::string_view key) {
+  const Value* value = value_at(table, key);
+  return value ? read_course(table, key, *value) : CourseScene{};
+}
+
+std::vector<CourseScene> read_courses(TableReader& table, std::string_view key) {
+  const Value* value = value_at(table, key);
+  if (!value) return {};
+  if (value->kind != Value::Kind::array) return {read_course(table, key, *value)};
+  std::vector<CourseScene> courses;
+  for (const Value& item : value->items) courses.push_back(read_course(table, key, item));
+  return courses;
+}
+
+std::array<CourseScene, 3> read_three_courses(TableReader& table, std::string_view key) {
+  std::array<CourseScene, 3> three;
+  const Value* value = value_at(table, key);
+  if (!value) return three;
+  if (value->kind != Value::Kind::array || value->items.size() != 3) {
+    table.fault(key, "must be an array of 3 numbers or expressions of t, one per axis");
+    return three;
+  }
+  for (size_t i = 0; i < 3; ++i) {
+    three[i] = read_course(table, key, value->items[i]);
+    if (is_number(value->items[i]) && value->items[i].number == 0) three[i] = {};
+  }
+  return three;
+}
+
+PlaceScene read_place(TableReader& parent, std::string_view key) {
+  PlaceScene place;
+  auto table = parent.table(key, true);
+  if (!table) return place;
+  place.body = table->text("body", "");
+  if (place.body == scene_keys::ground) place.body.clear();
+  place.marker = table->text("marker", "");
+  place.point = table->vector("point", place.point);
+  if (table->has("marker") && table->has("point"))
+    table->fault("point", "is given beside marker, which has its own; give one of them");
+  if (table->has("x")) place.x = table->vector("x");
+  if (table->has("z")) place.z = table->vector("z");
+  place.z = unit_direction(place.z);
+  place.x = normal_to(unit_direction(place.x), place.z);
+  table->reject_unknown();
+  return place;
+}
+
+void read_mechanism(TableReader& table, HingeMechanism& m) {
+  m.stiffness = table.number("stiffness", m.stiffness);
+  m.rest = table.number("rest", m.rest);
+  m.damping = table.number("damping", m.damping);
+  m.stop_stiffness = table.number("stop_stiffness", m.stop_stiffness);
+  m.threshold = table.number("threshold", m.threshold);
+}
+
+JointScene read_joint(TableReader table) {
+  JointScene joint;
+  std::array<std::string_view, joint_types.size()> kinds;
+  for (size_t i = 0; i < kinds.size(); ++i) kinds[i] = joint_types[i].name;
+  if (!table.has("kind"))
+    table.fault(
+        "kind",
+        "is missing; it must be one of \"fixed\", \"hinge\", \"slider\", \"universal\", \"spherical\", \"free\"");
+  joint.kind = joint_types[table.choice("kind", kinds, static_cast<size_t>(joint.kind))].kind;
+  if (table.has("a")) joint.a = read_place(table, "a");
+  joint.b = read_place(table, "b");
+  joint.name = table.text("name", joint.b.body);
+  read_mechanism(table, joint.mechanism);
+  joint.drive = read_course(table, "drive");
+  joint.motion = read_courses(table, "motion");
+  joint.start = numbers(table, "start");
+  joint.start_rate = numbers(table, "start_rate");
+  if (const std::vector<double> attitude = numbers(table, "start_attitude"); attitude.size() == 4) {
+    joint.start_attitude = Eigen::Map<const Eigen::Vector4d>(attitude.data());
+  } else if (table.has("start_attitude")) {
+    table.fault("start_attitude", "must be a unit quaternion [w, x, y, z], from the axes of b to those of a");
+  }
+  joint.start_omega = table.vector("start_omega", joint.start_omega);
+  joint.start_position = table.vector("start_position", joint.start_position);
+  joint.start_velocity = table.vector("start_velocity", joint.start_velocity);
+  joint.loads = table.boolean("loads", joint.loads);
+  joint.closes_loop = table.boolean("closes_loop", joint.closes_loop);
+  table.reject_unknown();
+  return joint;
+}
+
+SpringScene read_spring(TableReader table) {
+  SpringScene spring;
+  spring.name = table.text("name");
+  spring.a = read_place(table, "a");
+  spring.b = read_place(table, "b");
+  spring.stiffness = table.number("stiffness", spring.stiffness);
+  spring.free_length = table.number("free_length", spring.free_length);
+  spring.damping = table.number("damping", spring.damping);
+  table.reject_unknown();
+  return spring;
+}
+
+LoadScene read_load(TableReader table) {
+  LoadScene load;
+  load.name = table.text("name");
+  load.at = read_place(table, "at");
+  load.inertial_axes = table.choice("axes", scene_keys::load_axes, 0) == 1;
+  load.force = read_three_courses(table, "force");
+  load.torque = read_three_courses(table, "torque");
+  table.reject_unknown();
+  return load;
+}
+
+WheelScene read_wheel(TableReader table) {
+  WheelScene wheel;
+  wheel.name = table.text("name");
+  wheel.body = table.text("body");
+  wheel.axis = unit_direction(table.vector("axis", wheel.axis));
+  wheel.inertia = table.number("inertia");
+  wheel.spin = table.number("spin", wheel.spin);
+  wheel.torque = read_course(table, "torque");
+  table.reject_unknown();
+  return wheel;
+}
+
+}  // namespace
+
+void read_tree(TableReader& table, Scene& scene) {
+  scene.is_tree = true;
+  for (const char* key : {"hub", "hinges", "initial", "orbit"})
+    if (table.has(key))
+      table.fault(key,
+                  "belongs to scenes of one hub with [[hinges]]; with [[joints]] the hub is one of the [[bodies]], "
+                  "hinges and start values are those of its joints, and there is no orbit yet");
+  scene.gravity = table.vector("gravity", scene.gravity);
+  for (TableReader& joint : table.tables("joints")) scene.joints.push_back(read_joint(joint));
+  for (TableReader& spring : table.tables("springs")) scene.springs.push_back(read_spring(spring));
+  for (TableReader& load : table.tables("loads")) scene.loads.push_back(read_load(load));
+  for (TableReader& wheel : table.tables("wheels")) scene.wheels.push_back(read_wheel(wheel));
+}
+
+}  // namespace flexboom

@@ -1,0 +1,258 @@
+// Scenes with joints: what is read, written back and refused.
+
+#include "apps/scene.hpp"
+#include "apps/simulate.hpp"
+
+#include "fem/check.hpp"
+#include "reduction/body_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <random>
+
+namespace flexboom {
+namespace {
+
+// A scene that uses every key of a tree.
+const char* const full_tree = R"toml(format = "flexboom-scene-1"
+name = "everything"
+duration = 2
+gravity = [0, 0, -9.81]
+accuracy = { tolerance = 1e-5, outputs = ["lift.length", "arm.tip", "wheel.spin"], budget = false }
+integrator = { method = "bdf" }
+[[bodies]]
+name = "hub"
+mass = 8.5
+inertia = [0.1, 0.12, 0.05]
+centre = [0, 0, 0.1]
+size = [0.1, 0.2, 0.3]
+[[bodies]]
+name = "arm"
+stiffening = "on"
+modes = 2
+[[bodies.segments]]
+shape = "tube"
+diameter = 0.02
+thickness = 0.001
+length = 0.5
+material = { E = 7e10, nu = 0.3, rho = 2700 }
+[[bodies.attachments]]
+name = "head"
+position = 0.4
+mass = 0.1
+[[bodies]]
+name = "hook"
+mass = 1
+inertia = [1e-3, 1e-3, 1e-3]
+[[bodies]]
+name = "ball"
+mass = 1
+inertia = [1e-3, 1e-3, 1e-3]
+[[joints]]
+name = "lift"
+kind = "slider"
+a = { point = [1, 0, 0], x = [0, 1, 0], z = [1, 0, 0] }
+b = { body = "hub" }
+stiffness = 100
+rest = 0.1
+damping = 2
+stop_stiffness = 1e4
+threshold = 0.2
+drive = "2*sin(t)"
+start = 0.05
+start_rate = -0.1
+loads = true
+[[joints]]
+name = "shoulder"
+kind = "hinge"
+a = { body = "hub", point = [0, 0, 0.2], x = [0.70710678, 0.70710678, 0] }
+b = { body = "arm", marker = "root" }
+motion = { profile = "trapezoid", angle = 1.5, peak_rate = 2, peak_acceleration = 5 }
+[[joints]]
+name = "wrist"
+kind = "universal"
+a = { body = "arm", marker = "tip" }
+b = { body = "hook" }
+motion = ["0.1*t^2", 0.2]
+[[joints]]
+name = "string"
+kind = "spherical"
+a = { body = "arm", marker = "head" }
+b = { body = "ball", point = [0, 0, 0.2] }
+start_attitude = [0.6, 0.8, 0, 0]
+start_omega = [0.1, 0.2, 0.3]
+[[springs]]
+name = "tether"
+a = { body = "ball" }
+b = { body = "ground", point = [1, 1, 1] }
+stiffness = 3
+free_length = 0.1
+damping = 0.2
+[[loads]]
+name = "push"
+at = { body = "arm", marker = "tip" }
+axes = "inertial"
+force = [0, "exp(-t)", 1.5]
+torque = [0, 0, "t*(t<1)"]
+[[wheels]]
+name = "wheel"
+body = "hub"
+axis = [0, 1, 0]
+inertia = 0.01
+spin = 100
+torque = { time = [0, 1, 2], value = [0, 0.1, 0], interpolation = "linear" }
+)toml";
+
+std::string with(std::string text, const std::string& old, const std::string& replacement) {
+  const size_t at = text.find(old);
+  EXPECT_NE(at, std::string::npos) << old;
+  return text.replace(at, old.size(), replacement);
+}
+
+std::string fault_of(const std::string& text) {
+  try {
+    parse_scene(text, "scene.toml");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(TreeScene, IsReadAndWrittenBack) {
+  const Scene scene = parse_scene(full_tree, "scene.toml");
+  ASSERT_TRUE(scene.is_tree);
+  ASSERT_EQ(scene.joints.size(), 4u);
+  EXPECT_EQ(scene.joints[0].name, "lift");
+  EXPECT_EQ(scene.joints[0].kind, JointKind::slider);
+  EXPECT_EQ(scene.joints[0].mechanism.threshold, 0.2);
+  EXPECT_EQ(scene.joints[0].drive.expression, "2*sin(t)");
+  EXPECT_NEAR(scene.joints[1].a.x.norm(), 1, 1e-15);  // rounded by hand
+  EXPECT_EQ(scene.joints[1].motion[0].manoeuvre->angle, 1.5);
+  EXPECT_EQ(scene.joints[2].motion[1].expression, "0.2");
+  EXPECT_TRUE(scene.springs[0].b.body.empty());
+  EXPECT_EQ(scene.loads[0].force[1].expression, "exp(-t)");
+  EXPECT_FALSE(scene.loads[0].force[0].given());
+  EXPECT_EQ(scene.wheels[0].torque.table->value[1], 0.1);
+  const std::string text = to_toml(scene);
+  EXPECT_EQ(to_toml(parse_scene(text, "scene.toml")), text);
+}
+
+TEST(TreeScene, Flies) {
+  Scene scene = parse_scene(full_tree, "scene.toml");
+  scene.duration = 0.5;
+  scene.wheels[0].torque = {};
+  const RunResult r = run_scene(scene, {});
+  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-3);
+  EXPECT_GT(r.outputs.values.rows(), 10);
+  EXPECT_TRUE(r.outputs.values.allFinite());
+  const auto has = [&](const char* name) {
+    return std::find(r.outputs.names.begin(), r.outputs.names.end(), name) != r.outputs.names.end();
+  };
+  for (const char* name :
+       {"lift.length", "lift.rate", "lift.force.x", "shoulder.angle", "wrist.angle2", "string.rotation.x",
+        "string.omega.z", "arm.q2", "arm.tip.y", "wheel.spin", "energy.work", "energy.potential"})
+    EXPECT_TRUE(has(name)) << name;
+  EXPECT_FALSE(has("lift.drive"));  // it is given
+}
+
+TEST(TreeScene, TakesBodiesReducedBefore) {
+  const Scene plain = load_scene("flexible-appendage");
+  const std::filesystem::path file = std::filesystem::temp_directory_path() / "flexboom-tree-scene.h5";
+  PreparedBody panel = prepare_body(plain.bodies[1]);
+  write_body_file(file, panel.body);
+  Scene scene = plain;
+  scene.bodies[1] = {};
+  scene.bodies[1].name = "panel";
+  scene.bodies[1].stiffening = "auto";
+  scene.bodies[1].modes = 0;
+  scene.bodies[1].reduced = std::make_shared<const ReducedBody>(read_body_file(file));
+  scene.bodies[1].structure = "beam";
+  scene.bodies[1].reduced_file = file;
+  const Scene again = parse_scene(to_toml(scene), "scene.toml");
+  EXPECT_EQ(to_toml(again), to_toml(scene));
+  const auto end = [](Scene s) {
+    s.duration = 1;
+    s.error_budget = false;
+    const RunResult r = run_scene(s, {});
+    return Eigen::VectorXd(r.outputs.values.row(r.outputs.values.rows() - 1));
+  };
+  EXPECT_EQ(end(again), end(plain));  // every bit of the file comes back
+  std::filesystem::remove(file);
+}
+
+TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
+  const std::string good = full_tree;
+  EXPECT_EQ(fault_of(good), "");
+  const struct {
+    const char *old, *replacement, *words;
+  } cases[] = {
+      {"kind = \"slider\"", "kind = \"slide\"", "joints[0].kind: is \"slide\"; did you mean \"slider\"?"},
+      {"a = { body = \"hub\", point = [0, 0, 0.2]", "a = { body = \"hup\", point = [0, 0, 0.2]",
+       "joints[1].a.body: is \"hup\"; did you mean \"hub\"?"},
+      {"a = { body = \"arm\", marker = \"head\" }", "a = { body = \"arm\", marker = \"heat\" }",
+       "joints[3].a.marker: is \"heat\"; did you mean \"head\"?"},
+      {"drive = \"2*sin(t)\"", "drive = \"2*sinn(t)\"", "joints[0].drive: "},
+      {"drive = ", "driv = ", "joints[0].driv: unknown key; did you mean \"drive\"?"},
+      {"a = { body = \"hub\", point = [0, 0, 0.2]", "a = { body = \"hook\", point = [0, 0, 0.2]",
+       "in a circle of joints"},
+      {"b = { body = \"ball\", point = [0, 0, 0.2] }", "b = { body = \"hook\" }", "hangs on joint \"wrist\" already"},
+      {"start_attitude = [0.6, 0.8, 0, 0]", "start_attitude = [0.6, 0.9, 0, 0]", "has length"},
+      {"start_omega = [0.1, 0.2, 0.3]", "start_position = [0.1, 0.2, 0.3]", "a spherical joint has none"},
+      {"motion = [\"0.1*t^2\", 0.2]", "motion = \"0.1*t^2\"", "a universal joint needs 2"},
+      {"z = [1, 0, 0] }", "z = [0, 1, 0] }", "joints[0].a.x: is not normal to z"},
+      {"value = [0, 0.1, 0]", "value = [0, 0.1]", "wheels[0].torque: "},
+      {"time = [0, 1, 2]", "time = [0, 1, 1.5]", "the table reaches from 0 s to 1.5 s"},
+      {"loads = true", "closes_loop = true", "formulation = \"multipliers\""},
+      {"method = \"bdf\"", "method = \"exponential\"", "integrator.method: is \"exponential\"; it must be"},
+      {"\"lift.length\"", "\"lift.lenght\"", "accuracy.outputs: is \"lift.lenght\"; did you mean \"lift.length\"?"},
+      {"gravity = [0, 0, -9.81]", "orbit = {}", "orbit: belongs to scenes of one hub"},
+      {"mass = 8.5", "mass = -8.5", "bodies[0].mass: is -8.5 kg"},
+      {"stiffening = \"on\"", "stiffening = \"on\"\nstructure = \"eq14\"", "has none; use \"beam\""},
+      {"stiffness = 3\n", "stiffness = -3\n", "springs[0].stiffness: is -3 N/m"},
+      {"b = { body = \"hub\" }", "b = { }", "joints[0].b: has no body"},
+  };
+  for (const auto& c : cases) {
+    const std::string fault = fault_of(with(good, c.old, c.replacement));
+    EXPECT_NE(fault.find(c.words), std::string::npos) << c.replacement << "\n" << fault;
+    EXPECT_EQ(fault.find("scene.toml:"), 0u) << fault;
+  }
+}
+
+TEST(TreeScene, EveryFaultIsReportedInOneGo) {
+  const std::string fault = fault_of(
+      with(with(with(full_tree, "damping = 2\n", "damping = -2\n"), "sin(t)", "sin(x)"), "spin = 100", "spinn = 100"));
+  EXPECT_EQ(std::count(fault.begin(), fault.end(), '\n'), 2) << fault;
+}
+
+// Any change of a byte or a line gives a scene or an InputError that names the file.
+TEST(TreeScene, MutationsAreAcceptedOrInputErrors) {
+  std::mt19937 random(5);
+  const std::string good = full_tree;
+  for (int i = 0; i < 400; ++i) {
+    std::string text = good;
+    const size_t at = random() % text.size();
+    if (i % 3 == 0) text[at] = static_cast<char>(random() % 128);
+    if (i % 3 == 1) text.erase(at, 1 + random() % 20);
+    if (i % 3 == 2) text.insert(at, text.substr(random() % text.size(), random() % 30));
+    try {
+      parse_scene(text, "scene.toml");
+    } catch (const InputError& error) {
+      EXPECT_EQ(std::string(error.what()).find("scene.toml:"), 0u) << error.what();
+    }
+  }
+}
+
+TEST(TreeScene, BuiltinScenesAreWithoutFaults) {
+  for (const std::string& name : builtin_scene_names()) {
+    const Scene scene = load_scene(name);
+    const std::string text = to_toml(scene);
+    EXPECT_EQ(to_toml(parse_scene(text, "scene.toml")), text) << name;
+    EXPECT_EQ(scene.name, name);
+  }
+}
+
+}  // namespace
+}  // namespace flexboom
