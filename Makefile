@@ -18,7 +18,7 @@ sources = $(wildcard $(foreach folder,fem reduction dynamics apps tests tests/* 
 help:
 	@echo "make run           build, fly the scene sport, write results/sport and its report"
 	@echo "make test          build and run the tests; asan: the same with sanitizers; slow: the long ones"
-	@echo "make fuzz          random bytes into the mesh readers, FUZZ_SECONDS for each (600), with sanitizers"
+	@echo "make fuzz          random bytes into the mesh readers, FUZZ_SECONDS (600) for each, with sanitizers"
 	@echo "make bench         speed, measured"
 	@echo "make format, tidy  clang-format and clang-tidy over all sources"
 	@echo "make install-deps  install the Debian packages all of these need (done by each of them, too)"
@@ -41,9 +41,11 @@ slow: build-release
 fuzz: install-deps
 	cmake --preset fuzz
 	cmake --build --preset fuzz -j $(JOBS)
-	@for reader in gmsh vtu abaqus nastran; do echo "== $$reader"; mkdir -p build/fuzz/corpus/$$reader; \
-	  build/fuzz/tests/fuzz/fuzz_$$reader -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=3000 -verbosity=0 -print_final_stats=1 \
-	    -artifact_prefix=build/fuzz/$$reader- build/fuzz/corpus/$$reader tests/fem/meshes tests/fem/broken_meshes || exit 1; done
+	@printf '%s\n' gmsh vtu abaqus nastran | xargs -P $(JOBS) -I READER sh -c '\
+	  mkdir -p build/fuzz/corpus/READER; \
+	  build/fuzz/tests/fuzz/fuzz_READER -max_total_time=$(FUZZ_SECONDS) -rss_limit_mb=3000 -verbosity=0 -print_final_stats=1 \
+	    -artifact_prefix=build/fuzz/READER- build/fuzz/corpus/READER tests/fem/meshes tests/fem/broken_meshes \
+	    > build/fuzz/READER.log 2>&1; result=$$?; echo "== READER"; tail -n 40 build/fuzz/READER.log; exit $$result'
 
 bench: build-release
 	@for program in build/release/tests/bench_*; do [ -x "$$program" ] && [ -f "$$program" ] || continue; \
