@@ -32,7 +32,7 @@ Model body_model(const std::filesystem::path& path, const ModelOptions& options)
   model.backend = body.backend;
   model.damping = body.damping;
   if (body.structure == "eq14")
-    model.notes.push_back(
+    model.notes.emplace_back(
         "modes solves finite elements; the closed form of structure = \"eq14\" is in `flexboom compare`");
   if (!options.free) model.clamp = node_set(model.mesh, options.clamp.value_or(body.clamp));
   return model;

@@ -3,6 +3,7 @@
 #include "apps/version.hpp"
 #include "fem/check.hpp"
 #include "fem/inertia.hpp"
+#include "fem/stopwatch.hpp"
 #include "fem/text_reader.hpp"
 #include "reduction/attachment_modes.hpp"
 #include "reduction/certificate.hpp"
@@ -197,10 +198,12 @@ DampingRule parse_damping(const std::string& text) {
       "--damping: '{}' is not understood; there are none, modal:ZETA, loss-factor:ETA, rayleigh:ALPHA,BETA", text));
 }
 
-ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int threads) {
+ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int threads, ReductionSeconds& seconds) {
   check_options(a);
+  Stopwatch clock;
   const DampingRule damping = a.damping ? parse_damping(*a.damping) : model.damping;
   const Assembled m = assembled(model, a, threads);
+  seconds.assemble += clock.lap();
   ModalBasis basis = basis_of(model, m, a, threads);
   std::vector<AttachmentLoad> loads;
   for (const std::string& text : a.attachments) {
@@ -208,7 +211,9 @@ ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int thread
     loads.push_back({marker, direction});
   }
   if (!loads.empty()) basis = with_attachment_modes(std::move(basis), model.mesh, m.assembly, m.clamp, loads, threads);
+  seconds.modes += clock.lap();
   ReducedBody body = reduce(model.mesh, m.assembly, basis, model.name, threads);
+  seconds.invariants += clock.lap();
   if (a.select) {
     const std::vector<int> list = selection(body, *a.select);
     basis = selected(basis, list);
@@ -232,8 +237,10 @@ ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int thread
         model.mesh, m.assembly, held, basis.Phi,
         {.markers = loaded_markers(body, model.mesh), .threads = threads, .statics = held_statics, .Ke = &body.Ke});
   }
+  seconds.stiffening += clock.lap();
   apply_damping(body, damping);
   body.certificate = certificate(body, model.mesh, m.assembly, held, basis, exact_markers(a), threads, held_statics);
+  seconds.certificate += clock.lap();
   body.provenance = {fmt::format("flexboom {}", version), libraries(), a.model, mesh_hash(model.mesh),
                      options_text(a, eigen_options(model, a))};
   body.validate();
@@ -296,6 +303,16 @@ nlohmann::ordered_json checks_json(const std::vector<BodyCheck>& checks) {
                     {"relative_error", c.relative_error},
                     {"passed", c.passed}});
   return list;
+}
+
+nlohmann::ordered_json seconds_json(const ReductionSeconds& s) {
+  return {{"mesh", s.mesh},
+          {"assemble", s.assemble},
+          {"modes", s.modes},
+          {"invariants", s.invariants},
+          {"stiffening", s.stiffening},
+          {"certificate", s.certificate},
+          {"total", s.total}};
 }
 
 nlohmann::ordered_json body_json(const ReducedBody& body, const std::vector<BodyCheck>& checks,

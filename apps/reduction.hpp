@@ -10,10 +10,16 @@
 
 namespace flexboom {
 
+/// Wall time of the stages of a reduction [s].
+struct ReductionSeconds {
+  double mesh = 0, assemble = 0, modes = 0, invariants = 0, stiffening = 0, certificate = 0, total = 0;
+};
+
 /// The reduced body that `flexboom reduce` writes, with its certificate and provenance. The mesh of `model` may get
 /// reference nodes of interfaces; its notes grow by what the basis has to say.
+/// Adds the time of its stages to `seconds`.
 /// @throws InputError for options that do not fit each other or the model, NumericalError as the bases.
-ReducedBody make_reduced_body(Model& model, const ReduceArguments&, int threads);
+ReducedBody make_reduced_body(Model& model, const ReduceArguments&, int threads, ReductionSeconds& seconds);
 
 /// Mass, centre, inertia, coordinate table and checks of a body, as text.
 std::string description(const ReducedBody&, const std::vector<BodyCheck>& checks);
@@ -21,6 +27,7 @@ std::string description(const ReducedBody&, const std::vector<BodyCheck>& checks
 /// The same as a document; `notes` beside it.
 nlohmann::ordered_json body_json(const ReducedBody&, const std::vector<BodyCheck>& checks,
                                  const std::vector<std::string>& notes);
+nlohmann::ordered_json seconds_json(const ReductionSeconds&);
 nlohmann::ordered_json checks_json(const std::vector<BodyCheck>&);
 
 /// "modal:0.005", "loss-factor:0.01", "rayleigh:ALPHA,BETA", "none". @throws InputError.

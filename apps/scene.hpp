@@ -98,6 +98,7 @@ struct Scene {
   std::vector<SpringScene> springs;
   std::vector<LoadScene> loads;
   std::vector<WheelScene> wheels;
+  std::vector<TurnScene> turns;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // inertial axes [m/s^2]
 
   std::vector<std::string> warnings;  // what was repaired or is odd (e.g. an inertia that is not symmetric)

@@ -7,6 +7,7 @@
 #include "fem/stopwatch.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
@@ -108,6 +109,48 @@ ReactionWheel wheel_of(const Scene& scene, const WheelScene& w) {
   return wheel;
 }
 
+/// Inertia of all bodies about their mass centre at the start, axes of `body`, less what the rotors have about their
+/// own axes [kg m^2]: the angular momentum of unit rates.
+Matrix3d inertia_at_start(const Scene& scene, const Tree& tree, int body) {
+  TreeState s = start_state(scene, tree);
+  Place place;
+  place.body = body;
+  const Matrix3d attitude = tree.motion(0, tree.pack(s), place).axes;
+  const auto carrier = std::ranges::find(scene.joints, scene.bodies[static_cast<size_t>(body)].name,
+                                         [](const JointScene& j) { return j.b.body; });
+  JointState& joint = s.joints[static_cast<size_t>(carrier - scene.joints.begin())];
+  Matrix3d J;
+  for (int i = 0; i < 3; ++i) {
+    joint.omega = carrier->b.axes().row(i);
+    J.col(i) = attitude.transpose() * tree.balance(0, tree.pack(s)).angular_momentum;
+  }
+  for (const ReactionWheel& w : tree.scene().wheels)
+    if (w.body == body) J -= w.inertia * w.axis * w.axis.transpose();
+  return (J + J.transpose()) / 2;
+}
+
+/// Gives the three free wheels of the turning body the torques of the turns.
+void add_turns(const Scene& scene, Multibody& r) {
+  if (scene.turns.empty()) return;
+  const int body = index_of(scene, scene.turns.front().body);
+  Matrix3d axes;
+  std::vector<ReactionWheel*> wheels;
+  for (size_t i = 0; i < r.wheels.size(); ++i) {
+    if (r.wheels[i].body != body || scene.wheels[i].torque.given()) continue;
+    axes.col(std::ssize(wheels)) = r.wheels[i].axis;
+    wheels.push_back(&r.wheels[i]);
+  }
+  const Matrix3d J = inertia_at_start(scene, Tree(r), body), share = axes.inverse();
+  const auto torque = std::make_shared<const WheelTorques>(wheel_torques(J, turns_of(scene.turns)));
+  for (size_t i = 0; i < wheels.size(); ++i) {
+    wheels[i]->torque = [torque, row = Eigen::RowVector3d(share.row(static_cast<Eigen::Index>(i)))](double t) {
+      double sum = 0;
+      for (int k = 0; k < 3; ++k) sum += row[k] * torque->torque[static_cast<size_t>(k)].function.value(t);
+      return sum;
+    };
+  }
+}
+
 }  // namespace
 
 Multibody make_multibody(const Scene& scene, const std::vector<PreparedBody>& bodies) {
@@ -122,6 +165,7 @@ Multibody make_multibody(const Scene& scene, const std::vector<PreparedBody>& bo
     r.springs.push_back({s.name, place_of(scene, s.a), place_of(scene, s.b), s.stiffness, s.free_length, s.damping});
   for (const LoadScene& l : scene.loads) r.loads.push_back(load_of(scene, l));
   for (const WheelScene& w : scene.wheels) r.wheels.push_back(wheel_of(scene, w));
+  add_turns(scene, r);
   return r;
 }
 
@@ -145,10 +189,13 @@ namespace {
 /// Where functions of time are not smooth. Those of an expression are not known: no step passes an output then, so that
 /// a pulse is not stepped over.
 void set_corners(const Scene& scene, IntegratorOptions& o) {
+  const auto add_corners = [&](const TimeCourse& c) {
+    for (const double t : c.corners)
+      if (t > 0 && t < scene.duration) o.corners.push_back(t);
+  };
   const auto add = [&](const CourseScene& c) {
     if (!c.given()) return;
-    for (const double t : course_of(c, scene.duration).corners)
-      if (t > 0 && t < scene.duration) o.corners.push_back(t);
+    add_corners(course_of(c, scene.duration));
     o.step_to_outputs = o.step_to_outputs || !c.expression.empty();
   };
   for (const JointScene& j : scene.joints) {
@@ -158,6 +205,7 @@ void set_corners(const Scene& scene, IntegratorOptions& o) {
   for (const LoadScene& l : scene.loads)
     for (size_t i = 0; i < 3; ++i) add(l.force[i]), add(l.torque[i]);
   for (const WheelScene& w : scene.wheels) add(w.torque);
+  for (const WheelTurn& t : turns_of(scene.turns)) add_corners(rest_to_rest(t.manoeuvre));
   std::ranges::sort(o.corners);
   o.corners.erase(std::ranges::unique(o.corners).begin(), o.corners.end());
 }

@@ -82,12 +82,40 @@ std::vector<char> closed_stops(const Tree& tree, const VectorXd& y) {
   return contact;
 }
 
+/// Rotation vectors of the body that turns from the attitudes that the turns command, its own axes [rad].
+class Pointing {
+ public:
+  Pointing(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) : tree_(tree) {
+    if (scene.turns.empty()) return;
+    name_ = scene.turns.front().body;
+    body_.body = static_cast<int>(std::ranges::find(scene.bodies, name_, [](const BodyScene& b) { return b.name; }) -
+                                  scene.bodies.begin());
+    turns_ = turns_of(scene.turns);
+    start_ = tree.motion(motion.time[0], motion.y[0], body_).axes;
+  }
+
+  void put(Columns& out, double t, const VectorXd& y) const {
+    if (turns_.empty()) return;
+    const Eigen::Matrix3d commanded = start_ * rotation_matrix(commanded_attitude(turns_, t));
+    const Eigen::Quaterniond error(Eigen::Matrix3d(commanded.transpose() * tree_.motion(t, y, body_).axes));
+    out.put(name_ + ".pointing", rotation_vector({error.w(), error.x(), error.y(), error.z()}));
+  }
+
+ private:
+  const Tree& tree_;
+  std::string name_;
+  Place body_;
+  std::vector<WheelTurn> turns_;
+  Eigen::Matrix3d start_;
+};
+
 }  // namespace
 
 OutputTable tree_output_table(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) {
   OutputTable table;
   Columns out(table, static_cast<Eigen::Index>(motion.time.size()));
   const bool loads = std::any_of(scene.joints.begin(), scene.joints.end(), [](const JointScene& j) { return j.loads; });
+  const Pointing pointing(scene, tree, motion);
   for (size_t row = 0; row < motion.time.size(); ++row) {
     const double t = motion.time[row];
     const VectorXd& y = motion.y[row];
@@ -106,6 +134,7 @@ OutputTable tree_output_table(const Scene& scene, const Tree& tree, const TreeTr
         out.put(name + ".tip", tip_displacement(tree.scene().bodies[b], s.q[b], tree.stiffening(static_cast<int>(b))));
     }
     for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name + ".spin", s.spin[w]);
+    pointing.put(out, t, y);
     const TreeBalance& e = motion.balance[row];
     out.put("energy.kinetic", e.kinetic), out.put("energy.elastic", e.elastic);
     out.put("energy.potential", e.potential), out.put("energy.dissipated", e.dissipated);
@@ -135,6 +164,10 @@ void describe_tree(const Scene& scene, const Run& run, std::vector<std::string>&
     plan.push_back(fmt::format("joint {}: {}, {} on {}{}", j.name, joint_type(j.kind).name, j.b.body,
                                j.a.body.empty() ? "the inertial frame" : j.a.body,
                                j.motion.empty() ? "" : ", motion prescribed"));
+  for (const WheelTurn& t : turns_of(scene.turns))
+    plan.push_back(fmt::format("{} turns by {:g} rad about ({:g}, {:g}, {:g}), {}, from {:g} s to {:g} s",
+                               scene.turns.front().body, t.manoeuvre.angle, t.axis.x(), t.axis.y(), t.axis.z(),
+                               t.manoeuvre.profile, t.manoeuvre.start, rest_to_rest(t.manoeuvre).corners.back()));
 }
 
 }  // namespace flexboom

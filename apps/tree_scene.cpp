@@ -28,6 +28,17 @@ TimeCourse course_of(const CourseScene& course, double duration) {
   return r;
 }
 
+std::vector<WheelTurn> turns_of(const std::vector<TurnScene>& turns) {
+  std::vector<WheelTurn> r;
+  double end = 0;
+  for (const TurnScene& t : turns) {
+    r.push_back({t.axis, t.manoeuvre});
+    r.back().manoeuvre.start = end + t.pause;
+    end = rest_to_rest(r.back().manoeuvre).corners.back();
+  }
+  return r;
+}
+
 Eigen::Matrix3d PlaceScene::axes() const {
   Eigen::Matrix3d A;
   A << x, z.cross(x), z;
@@ -67,6 +78,7 @@ std::vector<std::string> tree_outputs(const Scene& scene) {
     names.push_back(body.name + ".tip");
   }
   for (const WheelScene& wheel : scene.wheels) names.push_back(wheel.name + ".spin");
+  if (!scene.turns.empty()) names.push_back(scene.turns.front().body + ".pointing");
   return names;
 }
 

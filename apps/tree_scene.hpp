@@ -3,6 +3,7 @@
 #include "dynamics/hinge.hpp"
 #include "dynamics/joint.hpp"
 #include "dynamics/time_function.hpp"
+#include "dynamics/wheel_profile.hpp"
 
 #include <Eigen/Core>
 
@@ -69,5 +70,16 @@ struct WheelScene {
   double inertia = 0, spin = 0;   // [kg m^2], [rad/s]
   CourseScene torque;             // on the rotor [N m]
 };
+
+/// A turn of the whole scene by the reaction wheels of a body, from rest to rest.
+struct TurnScene {
+  std::string body;
+  Eigen::Vector3d axis{0, 0, 1};  // unit, BRF
+  Manoeuvre manoeuvre;            // its start is not used
+  double pause = 0;               // from t = 0 or the end of the turn before [s]
+};
+
+/// The turns one after another. @throws InputError as rest_to_rest.
+std::vector<WheelTurn> turns_of(const std::vector<TurnScene>&);
 
 }  // namespace flexboom

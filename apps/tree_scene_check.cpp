@@ -1,4 +1,4 @@
-// Checks of [[joints]], [[springs]], [[loads]] and [[wheels]].
+// Checks of [[joints]], [[springs]], [[loads]], [[wheels]] and [[turns]].
 
 #include "apps/scene.hpp"
 #include "apps/scene_checks.hpp"
@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -44,6 +45,8 @@ class TreeCheck {
     each("springs", scene_.springs, [this](const auto& path, const SpringScene& s) { spring(path, s); });
     each("loads", scene_.loads, [this](const auto& path, const LoadScene& l) { load(path, l); });
     each("wheels", scene_.wheels, [this](const auto& path, const WheelScene& w) { wheel(path, w); });
+    each("turns", scene_.turns, [this](const auto& path, const TurnScene& t) { turn(path, t); });
+    if (!scene_.turns.empty()) turning_body();
     if (faults_.clean("joints") && bodies_known()) topology();
   }
 
@@ -197,6 +200,46 @@ class TreeCheck {
     check_positive(faults_, path + ".inertia", w.inertia, " kg m^2");
     check_finite(faults_, path + ".spin", w.spin);
     course(path + ".torque", w.torque);
+  }
+
+  void turn(const std::string& path, const TurnScene& t) {
+    check_unit(faults_, path + ".axis", t.axis);
+    check_not_negative(faults_, path + ".pause", t.pause, " s");
+    if (t.body != scene_.turns.front().body)
+      faults_.add(path + ".body", fmt::format("is not {}, the body of the first turn; all turns are of one body",
+                                              toml_reader::quoted(scene_.turns.front().body)));
+    try {
+      rest_to_rest(t.manoeuvre);
+    } catch (const InputError& error) {
+      faults_.add(path, error.what());
+    }
+  }
+
+  /// The torques of the wheels are those of a free body at rest with three wheels.
+  void turning_body() {
+    const std::string& body = scene_.turns.front().body;
+    if (!body_named("turns[0].body", body)) return;
+    std::vector<Eigen::Vector3d> axes;
+    bool rest = true;
+    for (const WheelScene& w : scene_.wheels) {
+      if (w.body == body && !w.torque.given()) axes.push_back(w.axis);
+      rest = rest && w.spin == 0;
+    }
+    if (axes.size() != 3 || std::abs(axes[0].cross(axes[1]).dot(axes[2])) < 0.1)
+      faults_.add("turns[0].body", fmt::format("{} has {} wheels without a torque of their own; three are needed, with "
+                                               "axes that span space",
+                                               toml_reader::quoted(body), axes.size()));
+    bool free = false;
+    for (const JointScene& j : scene_.joints) {
+      free = free || (j.kind == JointKind::free && j.a.body.empty() && j.b.body == body);
+      rest = rest && j.start_omega.isZero(0) && j.start_velocity.isZero(0) &&
+             std::ranges::all_of(j.start_rate, [](double v) { return v == 0; });
+    }
+    if (!free)
+      faults_.add("turns[0].body",
+                  fmt::format("{} can not turn: it needs a joint of kind \"free\" to the inertial frame",
+                              toml_reader::quoted(body)));
+    if (!rest) faults_.add("turns", "start from rest: joints and wheels must have no rates at t = 0");
   }
 
   /// Each body hangs on one joint, and following them leads to the inertial frame.

@@ -1,4 +1,4 @@
-// [[joints]], [[springs]], [[loads]], [[wheels]]: from the file to a Scene.
+// [[joints]], [[springs]], [[loads]], [[wheels]], [[turns]]: from the file to a Scene.
 
 #include "apps/scene.hpp"
 #include "apps/scene_keys.hpp"
@@ -38,16 +38,21 @@ std::vector<double> numbers(TableReader& table, std::string_view key) {
   return result;
 }
 
+/// Without its start.
+Manoeuvre read_manoeuvre(TableReader& table) {
+  Manoeuvre m;
+  m.profile = table.text("profile", m.profile);
+  m.angle = table.number("angle");
+  m.peak_rate = table.number("peak_rate");
+  m.peak_acceleration = table.number("peak_acceleration");
+  return m;
+}
+
 CourseScene read_course_table(TableReader table) {
   CourseScene course;
   if (table.has("angle")) {
-    Manoeuvre m;
-    m.profile = table.text("profile", m.profile);
-    m.angle = table.number("angle");
-    m.peak_rate = table.number("peak_rate");
-    m.peak_acceleration = table.number("peak_acceleration");
-    m.start = table.number("start", m.start);
-    course.manoeuvre = m;
+    course.manoeuvre = read_manoeuvre(table);
+    course.manoeuvre->start = table.number("start", course.manoeuvre->start);
     table.reject_unknown(" (of a turn from rest to rest)");
     return course;
   }
@@ -206,6 +211,16 @@ WheelScene read_wheel(TableReader table) {
   return wheel;
 }
 
+TurnScene read_turn(TableReader table) {
+  TurnScene turn;
+  turn.body = table.text("body");
+  turn.axis = unit_direction(table.vector("axis", turn.axis));
+  turn.manoeuvre = read_manoeuvre(table);
+  turn.pause = table.number("pause", turn.pause);
+  table.reject_unknown();
+  return turn;
+}
+
 }  // namespace
 
 void read_tree(TableReader& table, Scene& scene) {
@@ -220,6 +235,7 @@ void read_tree(TableReader& table, Scene& scene) {
   for (TableReader& spring : table.tables("springs")) scene.springs.push_back(read_spring(spring));
   for (TableReader& load : table.tables("loads")) scene.loads.push_back(read_load(load));
   for (TableReader& wheel : table.tables("wheels")) scene.wheels.push_back(read_wheel(wheel));
+  for (TableReader& turn : table.tables("turns")) scene.turns.push_back(read_turn(turn));
 }
 
 }  // namespace flexboom

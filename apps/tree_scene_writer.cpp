@@ -1,4 +1,4 @@
-// [[joints]], [[springs]], [[loads]], [[wheels]] as TOML.
+// [[joints]], [[springs]], [[loads]], [[wheels]], [[turns]] as TOML.
 
 #include "apps/scene.hpp"
 #include "apps/scene_keys.hpp"
@@ -99,6 +99,16 @@ void write_tree(Writer& out, const Scene& scene) {
     out.key("inertia", w.inertia, "kg m^2");
     out.key("spin", w.spin, "rad/s");
     if (w.torque.given()) out.raw("torque", course(w.torque));
+  }
+  for (const TurnScene& t : scene.turns) {
+    out.table("[[turns]]");
+    out.key("body", t.body);
+    out.key("axis", t.axis);
+    out.key("profile", t.manoeuvre.profile);
+    out.key("angle", t.manoeuvre.angle, "rad");
+    out.key("peak_rate", t.manoeuvre.peak_rate, "rad/s");
+    out.key("peak_acceleration", t.manoeuvre.peak_acceleration, "rad/s^2");
+    out.key("pause", t.pause, "s");
   }
 }
 

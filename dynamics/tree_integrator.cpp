@@ -209,11 +209,12 @@ class TreeFlight {
         closed_[i] = contact;
         result_.events.push_back({t_, joint, contact, rate});
         changed = true;
-        if (std::abs(rate) < settle_ * largest_[i] && !pushed(i)) {
+        if (std::abs(rate) * period(i) < small(i) && !pushed(i)) {
           result_.summary.settled[i] = t_;
           armed_[i] = closed_[i] = 0;
         }
-      } else if (!armed_[i] && std::abs(rate) > 2 * settle_ * largest_[i]) {
+      } else if (!armed_[i] &&
+                 (std::abs(rate) * period(i) > 2 * small(i) || tree_.gap(y_.data(), joint) > 2 * small(i))) {
         result_.summary.settled[i] = -1;
         armed_[i] = 1;
         closed_[i] = tree_.gap(y_.data(), joint) > 0;
@@ -226,21 +227,32 @@ class TreeFlight {
   /// Is the gap on the wrong side of the flag, with no crossing found?
   bool slipped_through(size_t i) const {
     if (!armed_[i] || crossed_[i] != 0) return false;
-    const int joint = tree_.stops()[i];
-    const double gap = tree_.gap(y_.data(), joint);
-    const double noise =
-        scales_.error().tolerance * scales_.error().scale[tree_.layout().joints[static_cast<size_t>(joint)].scalar];
-    return closed_[i] ? gap < -noise : gap > noise;
+    const double gap = tree_.gap(y_.data(), tree_.stops()[i]);
+    return closed_[i] ? gap < -noise(i) : gap > noise(i);
+  }
+
+  /// What the method's error leaves open of a gap.
+  double noise(size_t i) const {
+    const ErrorScale& error = scales_.error();
+    return error.tolerance * error.scale[tree_.layout().joints[static_cast<size_t>(tree_.stops()[i])].scalar];
+  }
+
+  /// Size of motions about the stop that are not followed: those the scene does not ask for, and those that are hardly
+  /// more than noise, whose crossings would be as dense as the steps.
+  double small(size_t i) const { return std::max(settle_ * largest_[i] * period(i), 10 * noise(i)); }
+
+  /// Time scale of a joint on its stop [s].
+  double period(size_t i) const {
+    const Joint& joint = tree_.scene().joints[static_cast<size_t>(tree_.stops()[i])];
+    const ReducedBody& body = tree_.scene().bodies[static_cast<size_t>(joint.b.body)];
+    const double inertia = joint.kind == JointKind::slider ? body.m : body.J0.trace();
+    return std::sqrt(inertia / (joint.mechanism.stiffness + joint.mechanism.stop_stiffness));
   }
 
   /// Does something push a joint that is on its stop, so that it will not stay there?
   bool pushed(size_t i) {
     ode_->derivative(t_, y_.data(), closed_, y_dot_.data());
-    const Joint& joint = tree_.scene().joints[static_cast<size_t>(tree_.stops()[i])];
-    const ReducedBody& body = tree_.scene().bodies[static_cast<size_t>(joint.b.body)];
-    const double inertia = joint.kind == JointKind::slider ? body.m : body.J0.trace();
-    const double period = std::sqrt(inertia / (joint.mechanism.stiffness + joint.mechanism.stop_stiffness));
-    return std::abs(ode_->gap_rate(y_dot_.data(), static_cast<int>(i))) * period > 2 * settle_ * largest_[i];
+    return std::abs(ode_->gap_rate(y_dot_.data(), static_cast<int>(i))) * period(i) * period(i) > 2 * small(i);
   }
 
   void finish(double seconds) {

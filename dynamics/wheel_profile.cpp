@@ -1,12 +1,12 @@
 #include "dynamics/wheel_profile.hpp"
 
+#include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <utility>
 
 namespace flexboom {
@@ -53,17 +53,16 @@ WheelTorques wheel_torques(const Matrix3d& J, const std::vector<WheelTurn>& turn
   return r;
 }
 
-std::vector<WheelTurn> calibration_turns(const Manoeuvre& limits, double pause) {
-  std::vector<WheelTurn> turns;
-  double start = limits.start;
-  for (int axis = 0; axis < 3; ++axis) {
-    Manoeuvre m = limits;
-    m.angle = 4 * std::numbers::pi;
-    m.start = start + pause;
-    turns.push_back({Vector3d::Unit(axis), m});
-    start = rest_to_rest(m).corners.back();
+Eigen::Vector4d commanded_attitude(const std::vector<WheelTurn>& turns, double t) {
+  Eigen::Vector4d attitude(1, 0, 0, 0);
+  for (const WheelTurn& turn : turns) {
+    if (t <= turn.manoeuvre.start) break;
+    const double half = rest_to_rest(turn.manoeuvre).function.value(t) / 2;
+    Eigen::Vector4d step;
+    step << std::cos(half), std::sin(half) * turn.axis;
+    attitude = quaternion_product(attitude, step);
   }
-  return turns;
+  return attitude;
 }
 
 }  // namespace flexboom

@@ -27,7 +27,7 @@ struct WheelTorques {
 /// @throws InputError for turns that overlap, an axis that is not unit, or an inertia that is not symmetric.
 WheelTorques wheel_torques(const Eigen::Matrix3d& J, const std::vector<WheelTurn>&);
 
-/// Two turns about x, then y, then z, with a pause before each [s]; `limits` gives profile, peak rate and acceleration.
-std::vector<WheelTurn> calibration_turns(const Manoeuvre& limits, double pause);
+/// Where the turns want the body to be: quaternion (w, x, y, z), body -> its attitude before the first.
+Eigen::Vector4d commanded_attitude(const std::vector<WheelTurn>&, double t);
 
 }  // namespace flexboom

@@ -873,6 +873,9 @@ class Reduce(Case):
         names = " ".join(c["name"] for c in document["checks"])
         for word in ("finer quadrature", "Bessel", "six rigid motions", "unit force at tip along y"):
             self.assertIn(word, names)
+        seconds = document["seconds"]
+        stages = sum(seconds[k] for k in ("mesh", "assemble", "modes", "invariants", "stiffening", "certificate"))
+        self.assertTrue(0 < stages <= seconds["total"])
         seen = json.loads(flexboom("inspect", body, "--json").stdout)
         self.assertEqual(seen["mass"], document["mass"])
         self.assertEqual(seen["coordinates"], document["coordinates"])

@@ -10,11 +10,7 @@
 
 #include <Eigen/Geometry>
 
-#include <chrono>
 #include <cmath>
-#include <cstdio>
-#include <ctime>
-#include <utility>
 
 namespace flexboom {
 namespace {
@@ -142,32 +138,6 @@ TEST(ReducedSolidBoom, IsNearTheBeam) {
   EXPECT_LT((marker(solid, "tip").S - marker(beam, "tip").S).norm(), 1e-2);
   EXPECT_LT((marker(solid, "tip").S_theta - marker(beam, "tip").S_theta).norm(),
             1e-2 * marker(beam, "tip").S_theta.norm());
-}
-
-TEST(SlowReducedSolid, CostsAFractionOfTheEigenSolve) {
-  SolidOptions options;
-  options.order = 3;
-  options.grading = {.sectors = 4, .rings = 2, .long_elements = 24, .end_layers = 0, .corner_levels = 0};
-  const Mesh mesh = make_solid_mesh(test::boom4(BeamTheory::timoshenko, true), options);
-  Assembly assembly = assemble(mesh, 2);
-  auto seconds = [start = std::clock()]() mutable {  // of the processor: other work on the machine does not count
-    const std::clock_t now = std::clock();
-    return static_cast<double>(now - std::exchange(start, now)) / CLOCKS_PER_SEC;
-  };
-  EigenOptions eigen{.num_modes = 20, .sigma = {}, .backend = "auto"};
-  const ModalBasis basis = clamped_modes(mesh, assembly, node_set(mesh, "root"), eigen, 2);
-  const double modes = seconds();
-  const MatrixXd Ke = reduced_stiffness(mesh, assembly.dofs, basis.Phi, 2);
-  const double for_stiffness = seconds();
-  const MatrixXd gram = gram_matrix(mesh, assembly, basis.Phi, 2);
-  const double for_gram = seconds();
-  const auto start = std::chrono::steady_clock::now();
-  const ReducedBody body = reduce(mesh, assembly, basis, "b", 2);
-  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
-  const double reduction = seconds();
-  std::printf("%d unknowns, 20 modes, processor seconds: modes %.1f, Ke %.2f, gram %.2f, reduce %.2f (wall %.2f)\n",
-              basis.unknowns, modes, for_stiffness, for_gram, reduction, wall.count());
-  EXPECT_LT(reduction, 0.2 * modes);
 }
 
 }  // namespace
