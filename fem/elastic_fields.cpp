@@ -38,8 +38,9 @@ FLEXBOOM_FOR_EACH_PROCESSOR void scale_strains(const double* slopes, Index count
 constexpr int points_at_once = 16;  // their strains of eight pairs stay in the first cache
 constexpr int loads_at_once = 6;    // their sums stay in registers
 
-[[gnu::always_inline]] inline Eight eight_at(const double* from) {
-  Eight result;
+template <class Lanes>
+[[gnu::always_inline]] inline Lanes lanes_at(const double* from) {
+  Lanes result;
   std::memcpy(&result, from, sizeof result);
   return result;
 }
@@ -61,13 +62,14 @@ struct PackedWork {
   double* value;
 };
 
-/// Second-order strains xx yy zz xy yz zx (engineering shear) of shape k with eight shapes from l on, at one point.
-[[gnu::always_inline]] inline void set_second_order(const double* slopes, int stride, int k, int l, Eight* strains) {
+/// Second-order strains xx yy zz xy yz zx (engineering shear) of shape k with some shapes from l on, at one point.
+template <class Lanes>
+[[gnu::always_inline]] inline void set_second_order(const double* slopes, int stride, int k, int l, Lanes* strains) {
   double of_k[9];
-  Eight of_l[9];
+  Lanes of_l[9];
   for (int i = 0; i < 9; ++i) {
     of_k[i] = slopes[i * stride + k];
-    of_l[i] = eight_at(slopes + i * stride + l);
+    of_l[i] = lanes_at<Lanes>(slopes + i * stride + l);
   }
   const auto work = [&](int i, int j) __attribute__((always_inline)) {
     return of_k[3 * i] * of_l[3 * j].of + of_k[3 * i + 1] * of_l[3 * j + 1].of + of_k[3 * i + 2] * of_l[3 * j + 2].of;
@@ -80,16 +82,17 @@ struct PackedWork {
   strains[5].of = work(2, 0) + work(0, 2);
 }
 
-FLEXBOOM_FOR_EACH_PROCESSOR void add_work(const PointBlock& block, const PackedWork& work) {
-  Eight strains[6 * points_at_once];
+template <class Lanes>
+[[gnu::always_inline]] inline void add_work_by(const PointBlock& block, const PackedWork& work) {
+  Lanes strains[6 * points_at_once];
   double* row = work.value;  // of the pair (k, k)
   for (int k = 0; k < work.shapes; row += work.shapes - k, ++k) {
-    for (int l = k; l < work.shapes; l += Eight::width) {
+    for (int l = k; l < work.shapes; l += Lanes::width) {
       for (int p = 0; p < block.points; ++p)
         set_second_order(block.slopes + 9 * p * block.stride, block.stride, k, l, strains + 6 * p);
-      const int lanes = std::min(Eight::width, work.shapes - l);
+      const int lanes = std::min(Lanes::width, work.shapes - l);
       for (int first = 0; first < block.loads; first += loads_at_once) {
-        Eight sums[loads_at_once] = {};
+        Lanes sums[loads_at_once] = {};
         for (int s = 0; s < 6 * block.points; ++s) {
           const double* const stress = block.stresses + s * block.loads + first;
 #pragma GCC unroll 6
@@ -97,8 +100,8 @@ FLEXBOOM_FOR_EACH_PROCESSOR void add_work(const PointBlock& block, const PackedW
         }
         for (int c = 0; c < std::min(loads_at_once, work.loads - first); ++c) {
           double* const to = row + (l - k) + (first + c) * work.stride;
-          if (lanes == Eight::width) {
-            sums[c].of += eight_at(to).of;
+          if (lanes == Lanes::width) {
+            sums[c].of += lanes_at<Lanes>(to).of;
             std::memcpy(to, &sums[c], sizeof sums[c]);
           } else {
             for (int lane = 0; lane < lanes; ++lane) to[lane] += sums[c].of[lane];
@@ -108,6 +111,16 @@ FLEXBOOM_FOR_EACH_PROCESSOR void add_work(const PointBlock& block, const PackedW
     }
   }
 }
+
+#ifdef FLEXBOOM_PROCESSORS
+[[gnu::target("avx512f")]] void add_work(const PointBlock& block, const PackedWork& work) {
+  add_work_by<Eight>(block, work);
+}
+[[gnu::target("avx2,fma")]] void add_work(const PointBlock& block, const PackedWork& work) {
+  add_work_by<Four>(block, work);
+}
+#endif
+FLEXBOOM_ANY_PROCESSOR void add_work(const PointBlock& block, const PackedWork& work) { add_work_by<Two>(block, work); }
 
 /// Stresses xx yy zz xy yz zx times the volume, in the columns 6 p + component.
 MatrixXd stresses(const FieldSlopes& fields, const Lame& m, Index padded) {

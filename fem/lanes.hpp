@@ -5,8 +5,10 @@
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__)
 #define FLEXBOOM_PROCESSORS
 #define FLEXBOOM_FOR_EACH_PROCESSOR [[gnu::target_clones("avx512f", "avx2", "default")]]
+#define FLEXBOOM_ANY_PROCESSOR [[gnu::target("default")]]  // beside versions written out for others
 #else
 #define FLEXBOOM_FOR_EACH_PROCESSOR
+#define FLEXBOOM_ANY_PROCESSOR
 #endif
 
 namespace flexboom {
@@ -24,5 +26,20 @@ struct alignas(16) Two {
   static constexpr int width = 2;
   double of [[gnu::vector_size(16)]];
 };
+
+/// A longer row, in as many registers as the processor needs for it: compilers keep a vector type that is wider than a
+/// register in memory.
+template <class Register, int registers>
+struct Row {
+  static constexpr int width = registers * Register::width;
+  Register part[registers];
+};
+
+/// y += a x.
+template <class Register, int registers>
+[[gnu::always_inline]] inline void add(Row<Register, registers>& y, double a, const Row<Register, registers>& x) {
+#pragma GCC unroll 4
+  for (int p = 0; p < registers; ++p) y.part[p].of += a * x.part[p].of;
+}
 
 }  // namespace flexboom

@@ -22,31 +22,56 @@ struct Columns {
 };
 
 /// Y += A X for a few columns kept row by row, so that an entry of A meets a run of neighbours.
-template <class Row>
-[[gnu::always_inline]] inline void accumulate(const Columns& A, const Row* x, Row* y) {
+template <class Rows>
+[[gnu::always_inline]] inline void accumulate(const Columns& A, const Rows* x, Rows* y) {
   for (Index j = 0; j < A.count; ++j) {
-    const Row x_j = x[j];
-    Row sum = y[j];
+    const Rows x_j = x[j];
+    Rows sum = y[j];
     for (int k = A.start[j]; k < A.start[j + 1]; ++k) {
       const Index i = A.row[k];
       if (i < j) continue;
-      sum.of += A.value[k] * x[i].of;
-      if (i != j) y[i].of += A.value[k] * x_j.of;
+      add(sum, A.value[k], x[i]);
+      if (i != j) add(y[i], A.value[k], x_j);
     }
     y[j] = sum;
   }
 }
 
-FLEXBOOM_FOR_EACH_PROCESSOR void add_product(const Columns& A, const Eight* x, Eight* y) { accumulate(A, x, y); }
+template <class Rows>
+[[gnu::always_inline]] inline void accumulate(const Columns& A, const double* x, double* y) {
+  accumulate(A, reinterpret_cast<const Rows*>(x), reinterpret_cast<Rows*>(y));
+}
 
-FLEXBOOM_FOR_EACH_PROCESSOR void add_product(const Columns& A, const Four* x, Four* y) { accumulate(A, x, y); }
+#ifdef FLEXBOOM_PROCESSORS
+[[gnu::target("avx512f")]] void by_8(const Columns& A, const double* x, double* y) {
+  accumulate<Row<Eight, 1>>(A, x, y);
+}
+[[gnu::target("avx512f")]] void by_4(const Columns& A, const double* x, double* y) {
+  accumulate<Row<Four, 1>>(A, x, y);
+}
+[[gnu::target("avx2,fma")]] void by_8(const Columns& A, const double* x, double* y) {
+  accumulate<Row<Four, 2>>(A, x, y);
+}
+[[gnu::target("avx2,fma")]] void by_4(const Columns& A, const double* x, double* y) {
+  accumulate<Row<Four, 1>>(A, x, y);
+}
+#endif
+FLEXBOOM_ANY_PROCESSOR void by_8(const Columns& A, const double* x, double* y) { accumulate<Row<Two, 4>>(A, x, y); }
+FLEXBOOM_ANY_PROCESSOR void by_4(const Columns& A, const double* x, double* y) { accumulate<Row<Two, 2>>(A, x, y); }
 
-template <class Row>
+void add_product(const Columns& A, const Eight* x, Eight* y) {
+  by_8(A, reinterpret_cast<const double*>(x), reinterpret_cast<double*>(y));
+}
+void add_product(const Columns& A, const Four* x, Four* y) {
+  by_4(A, reinterpret_cast<const double*>(x), reinterpret_cast<double*>(y));
+}
+
+template <class Rows>
 void product_of_columns(const Columns& A, const Eigen::Ref<const Eigen::MatrixXd>& X, Index first,
                         Eigen::Ref<Eigen::MatrixXd> Y) {
   const auto rows = static_cast<size_t>(A.count);
-  const int width = static_cast<int>(std::min<Index>(Row::width, X.cols() - first));  // fewer: beside zeros
-  std::vector<Row> x(rows, Row{}), y(rows, Row{});
+  const int width = static_cast<int>(std::min<Index>(Rows::width, X.cols() - first));  // fewer: beside zeros
+  std::vector<Rows> x(rows, Rows{}), y(rows, Rows{});
   for (int c = 0; c < width; ++c) {
     for (size_t i = 0; i < rows; ++i) x[i].of[c] = X(static_cast<Index>(i), first + c);
   }

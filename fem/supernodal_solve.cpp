@@ -10,13 +10,6 @@ namespace {
 
 using Index = std::ptrdiff_t;
 
-/// A row of x, in as many registers as the processor needs for it.
-template <class Register, int registers>
-struct Row {
-  static constexpr int width = registers * Register::width;
-  Register part[registers];
-};
-
 /// y -= a x.
 template <class Register, int registers>
 FLEXBOOM_INLINE void subtract(Row<Register, registers>& y, double a, const Row<Register, registers>& x) {
@@ -130,9 +123,6 @@ FLEXBOOM_INLINE void solve(const Supernodes& L, double* x) {
 [[gnu::target("avx512f")]] void by_16(const Supernodes& L, double* x) { solve<Eight, 8, 16>(L, x); }
 [[gnu::target("avx2,fma")]] void by_8(const Supernodes& L, double* x) { solve<Four, 4, 8>(L, x); }
 [[gnu::target("avx2,fma")]] void by_16(const Supernodes& L, double* x) { solve<Four, 2, 16>(L, x); }
-#define FLEXBOOM_ANY_PROCESSOR [[gnu::target("default")]]
-#else
-#define FLEXBOOM_ANY_PROCESSOR
 #endif
 FLEXBOOM_ANY_PROCESSOR void by_8(const Supernodes& L, double* x) { solve<Two, 2, 8>(L, x); }
 FLEXBOOM_ANY_PROCESSOR void by_16(const Supernodes& L, double* x) { solve<Two, 1, 16>(L, x); }
