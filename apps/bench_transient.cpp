@@ -4,6 +4,8 @@
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -49,6 +51,9 @@ class Bench {
     for (const Case& c : cases(scenes)) {
       std::vector<PreparedBody> bodies;
       for (const BodyScene& b : c.scene.bodies) bodies.push_back(prepare_body(b));
+      require(c.scene.formulation == "relative",
+              fmt::format("scene {}: formulation is \"{}\", but this compares the methods of \"relative\"", c.name,
+                          c.scene.formulation));
       const Flyable flyable = make_system(c.scene, bodies);
       references_.clear();
       for (const IntegratorMethod& method : integrator_methods()) ladder(c, flyable, std::string(method.name));

@@ -68,7 +68,7 @@ struct CommandLine {
     c->add_option("--tolerance", run.tolerance, "Relative error wanted in the outputs");
     c->add_option("--modes", run.modes, "Elastic coordinates of every body: a number, or auto");
     c->add_option("--structure", run.structure, "Model of every body: eq14, beam or rigid");
-    c->add_option("--formulation", run.formulation, "relative");
+    c->add_option("--formulation", run.formulation, "relative or multipliers");
     c->add_option("--integrator", run.integrator, "Integration method");
     c->add_option("--output-step", run.output_step, "Time between rows of trajectory.csv [s]");
     c->add_option("--vtu-step", run.vtu_step, "Time between .vtu files [s]; none by default");

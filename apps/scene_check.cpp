@@ -343,16 +343,14 @@ void check_accuracy(Faults& faults, const Scene& scene) {
 }
 
 void check_integrator(Faults& faults, const Scene& scene) {
+  check_name_among(faults, "integrator.formulation", scene.formulation, scene_keys::formulations);
+  const bool redundant = scene.formulation == "multipliers";
   std::vector<std::string_view> methods = {"auto"};
+  if (redundant) methods.push_back("ida");
   for (const IntegratorMethod& m : integrator_methods())
-    if (!scene.is_tree || m.name != IntegratorOptions{}.method) methods.push_back(m.name);  // that one knows hubs only
+    if (!redundant && (!scene.is_tree || m.name != IntegratorOptions{}.method)) methods.push_back(m.name);
   check_name_among(faults, "integrator.method", scene.integrator, methods);
-  if (scene.formulation == "multipliers") {
-    faults.add("integrator.formulation", "\"multipliers\" is not available in this version; it must be \"relative\"");
-  } else if (scene.formulation != "relative") {
-    faults.add("integrator.formulation",
-               fmt::format("is {}; it must be \"relative\"", toml_reader::quoted(scene.formulation)));
-  }
+  if (redundant) check_multipliers(scene, faults);
   if (!(std::isfinite(scene.settle) && scene.settle < 1)) {
     faults.add("integrator.settle",
                fmt::format("is {}; it must be below 1 (0: never, negative: tolerance / 100)", scene.settle));

@@ -22,6 +22,7 @@ inline constexpr std::array<std::string_view, 2> theories = {"euler-bernoulli", 
 inline constexpr std::array<std::string_view, 2> shear_rules = {"cowper", "nu-squared"};        // or a number
 inline constexpr std::array<std::string_view, 4> damping_rules = {"none", "modal", "loss-factor", "rayleigh"};
 
+inline constexpr std::array<std::string_view, 2> formulations = {"relative", "multipliers"};
 inline constexpr std::array<std::string_view, 3> stiffenings = {"auto", "on", "off"};
 inline constexpr std::array<std::string_view, 2> load_axes = {"body", "inertial"};
 inline constexpr std::string_view ground = "ground";  // the inertial frame as a body
@@ -76,6 +77,9 @@ void check_body(const BodyScene&, const std::string& path, toml_reader::Faults&)
 /// Joints, springs, loads, wheels and gravity: reading (apps/tree_scene_reader.cpp) and checking.
 void read_tree(toml_reader::TableReader&, Scene&);
 void check_tree(const Scene&, toml_reader::Faults&);
+
+/// What formulation = "multipliers" cannot do.
+void check_multipliers(const Scene&, toml_reader::Faults&);
 
 /// Columns of a scene with joints, a vector being one output: "arm.angle", "arm.q", "arm.tip".
 std::vector<std::string> tree_outputs(const Scene&);

@@ -1,6 +1,7 @@
 #include "apps/simulate.hpp"
 
 #include "apps/error_budget.hpp"
+#include "apps/multipliers_flight.hpp"
 #include "apps/tree_flight.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
@@ -301,16 +302,18 @@ Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_ste
   const Stopwatch start;
   Run r;
   for (const BodyScene& b : scene.bodies) r.bodies.push_back(prepare_body(b, refine));
+  const bool redundant = scene.formulation == "multipliers";
   if (scene.is_tree) {
     const double seconds = start.seconds();
-    Run flown = fly_tree(scene, std::move(r.bodies), hooks, max_steps);
+    Run flown = (redundant ? fly_by_multipliers : fly_tree)(scene, std::move(r.bodies), hooks, max_steps);
     flown.prepare_seconds += seconds;
     return flown;
   }
   const Flyable f = make_system(scene, r.bodies);
   r.prepare_seconds = start.seconds();
   const Stopwatch flight;
-  r.motion = integrate(f.system, f.y0, integrator_options(scene, hooks, "exponential", max_steps));
+  const IntegratorOptions options = integrator_options(scene, hooks, redundant ? "ida" : "exponential", max_steps);
+  r.motion = redundant ? integrate_by_multipliers(f, options) : integrate(f.system, f.y0, options);
   r.integrate_seconds = flight.seconds();
   r.outputs = output_table(scene, f.system, r.motion);
   return r;
@@ -342,6 +345,8 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
   plan.push_back(
       fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
                   run.motion.summary.method, scene.integrator == "auto" ? "chosen" : "as asked", scene.tolerance));
+  plan.push_back(scene.formulation == "multipliers" ? "formulation: redundant coordinates, joints by multipliers"
+                                                    : "formulation: relative coordinates");
   if (scene.is_tree) return describe_tree(scene, run, plan);
   plan.emplace_back("geometric stiffness: left out, its size is error_budget.linearisation");
   if (scene.orbit)

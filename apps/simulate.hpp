@@ -86,6 +86,7 @@ struct Run {
   std::shared_ptr<const Tree> tree;
   std::vector<double> stiffening_effect;  // per body: largest of its geometric stiffness against Ke
   double stiffening_left_out = 0;         // the largest of those that are off
+  std::vector<std::string> notes;         // for the plan
   std::vector<std::string> warnings;
 };
 /// What a scene asks of an integrator; `chosen`: the method where it leaves the choice. `max_steps` as of run_once.

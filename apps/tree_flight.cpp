@@ -184,10 +184,6 @@ TreeState start_state(const Scene& scene, const Tree& tree) {
   return s;
 }
 
-namespace {
-
-/// Where functions of time are not smooth. Those of an expression are not known: no step passes an output then, so that
-/// a pulse is not stepped over.
 void set_corners(const Scene& scene, IntegratorOptions& o) {
   const auto add_corners = [&](const TimeCourse& c) {
     for (const double t : c.corners)
@@ -209,6 +205,8 @@ void set_corners(const Scene& scene, IntegratorOptions& o) {
   std::ranges::sort(o.corners);
   o.corners.erase(std::ranges::unique(o.corners).begin(), o.corners.end());
 }
+
+namespace {
 
 IntegratorOptions options_of(const Scene& scene, const Multibody& bodies, const RunHooks& hooks, long max_steps) {
   const bool elastic = std::any_of(bodies.bodies.begin(), bodies.bodies.end(), [](const auto& b) { return b.n() > 0; });

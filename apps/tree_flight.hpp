@@ -3,6 +3,7 @@
 #include "apps/simulate.hpp"
 #include "dynamics/tree_integrator.hpp"
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,20 @@ PreparedBody prepare_reduced(const BodyScene&);
 /// `max_steps` > 0 bounds its cost. @throws InputError, NumericalError.
 Run fly_tree(const Scene&, std::vector<PreparedBody>, const RunHooks&, long max_steps);
 
-/// Columns of trajectory.csv.
+/// Adds where the scene's functions of time are not smooth. Those of an expression are not known: no step passes an
+/// output then, so that a pulse is not stepped over.
+void set_corners(const Scene&, IntegratorOptions&);
+
+/// What a row of trajectory.csv is made of.
+struct TreeMoment {
+  double time = 0;
+  TreeState state;               // joints as Scene::joints
+  std::vector<JointLoad> loads;  // the same
+  TreeBalance balance;
+};
+
+/// Columns of trajectory.csv. The rows are asked for one after the other.
+OutputTable tree_output_table(const Scene&, const Tree&, size_t rows, const std::function<TreeMoment(size_t)>& moment);
 OutputTable tree_output_table(const Scene&, const Tree&, const TreeTrajectory&);
 
 /// What was flown, one line each.

@@ -85,47 +85,44 @@ std::vector<char> closed_stops(const Tree& tree, const VectorXd& y) {
 /// Rotation vectors of the body that turns from the attitudes that the turns command, its own axes [rad].
 class Pointing {
  public:
-  Pointing(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) : tree_(tree) {
-    if (scene.turns.empty()) return;
+  explicit Pointing(const Scene& scene) : turns_(turns_of(scene.turns)) {
+    if (turns_.empty()) return;
     name_ = scene.turns.front().body;
-    body_.body = static_cast<int>(std::ranges::find(scene.bodies, name_, [](const BodyScene& b) { return b.name; }) -
-                                  scene.bodies.begin());
-    turns_ = turns_of(scene.turns);
-    start_ = tree.motion(motion.time[0], motion.y[0], body_).axes;
+    const auto carrier = std::ranges::find(scene.joints, name_, [](const JointScene& j) { return j.b.body; });
+    joint_ = static_cast<size_t>(carrier - scene.joints.begin());
+    from_place_ = carrier->b.axes();
+    start_ = rotation_matrix(carrier->start_attitude);
   }
 
-  void put(Columns& out, double t, const VectorXd& y) const {
+  void put(Columns& out, double t, const TreeState& s) const {
     if (turns_.empty()) return;
-    const Eigen::Matrix3d commanded = start_ * rotation_matrix(commanded_attitude(turns_, t));
-    const Eigen::Quaterniond error(Eigen::Matrix3d(commanded.transpose() * tree_.motion(t, y, body_).axes));
+    const Eigen::Matrix3d now = start_.transpose() * rotation_matrix(s.joints[joint_].attitude);
+    const Eigen::Quaterniond error(Eigen::Matrix3d(rotation_matrix(commanded_attitude(turns_, t)).transpose() *
+                                                   from_place_ * now * from_place_.transpose()));
     out.put(name_ + ".pointing", rotation_vector({error.w(), error.x(), error.y(), error.z()}));
   }
 
  private:
-  const Tree& tree_;
-  std::string name_;
-  Place body_;
   std::vector<WheelTurn> turns_;
-  Eigen::Matrix3d start_;
+  std::string name_;
+  size_t joint_ = 0;
+  Eigen::Matrix3d from_place_, start_;  // place b -> body; place b -> place a at the start
 };
 
 }  // namespace
 
-OutputTable tree_output_table(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) {
+OutputTable tree_output_table(const Scene& scene, const Tree& tree, size_t rows,
+                              const std::function<TreeMoment(size_t)>& moment) {
   OutputTable table;
-  Columns out(table, static_cast<Eigen::Index>(motion.time.size()));
-  const bool loads = std::any_of(scene.joints.begin(), scene.joints.end(), [](const JointScene& j) { return j.loads; });
-  const Pointing pointing(scene, tree, motion);
-  for (size_t row = 0; row < motion.time.size(); ++row) {
-    const double t = motion.time[row];
-    const VectorXd& y = motion.y[row];
-    const TreeState s = tree.unpack(y);
-    const std::vector<JointLoad> load =
-        loads ? tree.joint_loads(t, y, closed_stops(tree, y)) : std::vector<JointLoad>(scene.joints.size());
-    out.put("t", t);
+  Columns out(table, static_cast<Eigen::Index>(rows));
+  const Pointing pointing(scene);
+  for (size_t row = 0; row < rows; ++row) {
+    const TreeMoment now = moment(row);
+    const TreeState& s = now.state;
+    out.put("t", now.time);
     for (size_t i = 0; i < scene.joints.size(); ++i) {
       put_joint(out, scene.joints[i], s.joints[i]);
-      if (scene.joints[i].loads) put_load(out, scene.joints[i], load[i]);
+      if (scene.joints[i].loads) put_load(out, scene.joints[i], now.loads[i]);
     }
     for (size_t b = 0; b < scene.bodies.size(); ++b) {
       const std::string& name = scene.bodies[b].name;
@@ -134,14 +131,26 @@ OutputTable tree_output_table(const Scene& scene, const Tree& tree, const TreeTr
         out.put(name + ".tip", tip_displacement(tree.scene().bodies[b], s.q[b], tree.stiffening(static_cast<int>(b))));
     }
     for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name + ".spin", s.spin[w]);
-    pointing.put(out, t, y);
-    const TreeBalance& e = motion.balance[row];
+    pointing.put(out, now.time, s);
+    const TreeBalance& e = now.balance;
     out.put("energy.kinetic", e.kinetic), out.put("energy.elastic", e.elastic);
     out.put("energy.potential", e.potential), out.put("energy.dissipated", e.dissipated);
     out.put("energy.work", e.work);
     out.end_row();
   }
   return table;
+}
+
+OutputTable tree_output_table(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) {
+  const bool loads = std::any_of(scene.joints.begin(), scene.joints.end(), [](const JointScene& j) { return j.loads; });
+  return tree_output_table(scene, tree, motion.time.size(), [&](size_t row) {
+    const double t = motion.time[row];
+    const VectorXd& y = motion.y[row];
+    return TreeMoment{
+        t, tree.unpack(y),
+        loads ? tree.joint_loads(t, y, closed_stops(tree, y)) : std::vector<JointLoad>(scene.joints.size()),
+        motion.balance[row]};
+  });
 }
 
 void describe_tree(const Scene& scene, const Run& run, std::vector<std::string>& plan) {
@@ -154,20 +163,23 @@ void describe_tree(const Scene& scene, const Run& run, std::vector<std::string>&
     if (run.bodies[i].body.n() == 0) continue;
     const bool known = !run.bodies[i].body.Kg.spin.empty();
     const bool on = run.tree->stiffening(static_cast<int>(i)) == Stiffening::on;
-    plan.push_back(known ? fmt::format("{}: geometric stiffness {} (stiffening = \"{}\"): its effect reaches {:.2g} of "
-                                       "the stiffness of the body",
-                                       b.name, on ? "on" : "off", b.stiffening, run.stiffening_effect[i])
+    const std::string why = scene.formulation == "multipliers" ? "left out by multipliers"
+                                                               : fmt::format("stiffening = \"{}\"", b.stiffening);
+    plan.push_back(known ? fmt::format("{}: geometric stiffness {} ({}): its effect reaches {:.2g} of the stiffness of "
+                                       "the body",
+                                       b.name, on ? "on" : "off", why, run.stiffening_effect[i])
                          : fmt::format("{}: geometric stiffness unknown and left out ({}); its effect is not measured",
                                        b.name, b.reduced ? "not in the file" : "structure \"eq14\""));
   }
   for (const JointScene& j : scene.joints)
-    plan.push_back(fmt::format("joint {}: {}, {} on {}{}", j.name, joint_type(j.kind).name, j.b.body,
+    plan.push_back(fmt::format("joint {}: {}, {} on {}{}{}", j.name, joint_type(j.kind).name, j.b.body,
                                j.a.body.empty() ? "the inertial frame" : j.a.body,
-                               j.motion.empty() ? "" : ", motion prescribed"));
+                               j.motion.empty() ? "" : ", motion prescribed", j.closes_loop ? ", closes a loop" : ""));
   for (const WheelTurn& t : turns_of(scene.turns))
     plan.push_back(fmt::format("{} turns by {:g} rad about ({:g}, {:g}, {:g}), {}, from {:g} s to {:g} s",
                                scene.turns.front().body, t.manoeuvre.angle, t.axis.x(), t.axis.y(), t.axis.z(),
                                t.manoeuvre.profile, t.manoeuvre.start, rest_to_rest(t.manoeuvre).corners.back()));
+  plan.insert(plan.end(), run.notes.begin(), run.notes.end());
 }
 
 }  // namespace flexboom

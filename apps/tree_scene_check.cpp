@@ -135,8 +135,20 @@ class TreeCheck {
       faults_.add(path + ".drive", fmt::format("a {} joint has none; hinges and sliders have", type.name));
     motion(path, j, type);
     start(path, j, type);
-    if (j.closes_loop && scene_.formulation != "multipliers")
+    if (j.closes_loop) loop(path, j);
+  }
+
+  void loop(const std::string& path, const JointScene& j) {
+    if (scene_.formulation != "multipliers")
       faults_.add(path + ".closes_loop", "is true: a loop needs [integrator] formulation = \"multipliers\"");
+    if (j.a.body == j.b.body)
+      faults_.add(path + ".b",
+                  fmt::format("is on {} as a is; a joint is between two bodies", toml_reader::quoted(j.b.body)));
+    const JointScene none;
+    const bool starts = !j.start.empty() || !j.start_rate.empty() || j.start_attitude != none.start_attitude ||
+                        !j.start_omega.isZero(0) || !j.start_position.isZero(0) || !j.start_velocity.isZero(0);
+    if (starts)
+      faults_.add(path + ".closes_loop", "is true, so the start of the joint follows from the others; drop its own");
   }
 
   void motion(const std::string& path, const JointScene& j, const JointType& type) {

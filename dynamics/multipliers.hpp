@@ -24,6 +24,12 @@ struct BodyState {
   Eigen::VectorXd q_dot{};                                 // empty: zeros
 };
 
+/// Derivatives of the velocities of a body.
+struct BodyAcceleration {
+  Eigen::Vector3d of_origin = Eigen::Vector3d::Zero();  // of R, inertial axes [m/s^2]
+  Eigen::Vector3d angular = Eigen::Vector3d::Zero();    // BRF axes [rad/s^2]
+};
+
 /// What a joint's constraints do to b, at the place b, in the axes of place a; a gets the opposite. The mechanism's own
 /// torque is not in it, the torque of a prescribed motion is.
 struct JointReaction {
@@ -37,7 +43,9 @@ struct MultibodyState {
   std::vector<double> coordinate, rate;  // per joint: angle of a hinge [rad], way of a slider [m]; 0 of the others
   std::vector<JointReaction> loads;      // per joint
   std::vector<double> spin;              // per wheel, relative to its body [rad/s]
-  double supplied = 0;                   // work of loads, prescribed motions and wheels less what dampers took [J]
+  double work = 0;                       // of loads, prescribed motions and wheels since the start [J]
+  double dissipated = 0;                 // by all dampers [J]
+  std::vector<BodyAcceleration> accelerations;
 };
 
 struct MultipliersOptions {
@@ -47,6 +55,10 @@ struct MultipliersOptions {
   /// As in IntegratorOptions: below this part of its largest rate a hinge on its stop has settled. Negative: tolerance
   /// / 100. Zero: never.
   double settle = -1;
+  std::vector<double> angles{};  // per joint: a hinge starts at the turn nearest to this [rad]; empty: to its rest
+  /// As in IntegratorOptions: where functions of time are not smooth, ascending [s]; no step passes an output.
+  std::vector<double> corners{};
+  bool step_to_outputs = false;
   std::string linear_solver = "klu";  // or "dense"
   long max_steps = 200'000'000;
   const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
@@ -70,7 +82,7 @@ struct MultipliersSummary {
   double velocity_drift = 0;           // of the constraints' rates [m/s]
   double angular_velocity_drift = 0;   // [rad/s]
   double quaternion_drift = 0;         // max | |p| - 1 |
-  double energy_balance = 0;           // max |E - E0 - supplied| / max E
+  double energy_balance = 0;           // max |E + dissipated - work - E0| / max E
   double momentum_drift = 0;           // of both momenta, each over its scale; 0 where something holds or pushes
   std::vector<std::string> redundant;  // constraint rows left out, by joint
   std::vector<double> settled;         // per joint: time after which its stop was no longer looked at, or -1

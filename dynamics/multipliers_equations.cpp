@@ -49,7 +49,8 @@ void Equations::keep_rows(const std::vector<char>& kept) {
       r.mu = r.kept ? size_++ : -1;
     }
   for (BodyPlaces& b : places_) b.nu = size_++;
-  supplied_ = size_++;
+  work_ = size_++;
+  dissipated_ = size_++;
 }
 
 VectorXd Equations::pack(const std::vector<BodyState>& states) const {
@@ -167,7 +168,7 @@ void Equations::body_residual(size_t i, const double* y, const double* y_dot, do
 
 void Equations::residual(double t, const double* y, const double* y_dot, const JointMemory& memory, double* F) {
   std::fill(F, F + size_, 0.0);
-  double power = 0;
+  double power = 0, loss = 0;
   for (size_t i = 0; i < places_.size(); ++i) body_residual(i, y, y_dot, F);
   for (size_t i = 0; i < joints_.size(); ++i) {
     const JointData& j = joints_[i];
@@ -181,7 +182,7 @@ void Equations::residual(double t, const double* y, const double* y_dot, const J
     constrain(j, x, a, b, multipliers(j, y), g.data(), g_dot.data(), forces, &correction, power);
     if (j.mechanism)
       act_mechanism(j, joint.mechanism, joint.kind == JointKind::hinge, memory.closed[i], memory.near[i], x, a, b,
-                    forces, power);
+                    forces, loss);
     for (size_t k = 0; k < j.rows.size(); ++k)
       if (j.rows[k].kept) F[j.rows[k].mu] = g[k], F[j.rows[k].lambda] = g_dot[k];
     scatter(j.a, forces.a, F);
@@ -194,7 +195,7 @@ void Equations::residual(double t, const double* y, const double* y_dot, const J
     const PairMotion<double> x = pair(j, t, y, nullptr);
     PairForces<double> forces;
     act_spring(j, scene_.springs[i], x, place_motion(j.a, x.frame_a, x.elastic_a),
-               place_motion(j.b, x.frame_b, x.elastic_b), forces, power);
+               place_motion(j.b, x.frame_b, x.elastic_b), forces, loss);
     scatter(j.a, forces.a, F);
     scatter(j.b, forces.b, F);
   }
@@ -221,9 +222,10 @@ void Equations::residual(double t, const double* y, const double* y_dot, const J
     const BodyPlaces& at = places_[i];
     if (at.n == 0) continue;
     const Map<const VectorXd> u(y + at.u, at.n);
-    power -= u.dot(prepared_.bodies[i].De.lazyProduct(u));
+    loss += u.dot(prepared_.bodies[i].De.lazyProduct(u));
   }
-  F[supplied_] = y_dot[supplied_] - power;
+  F[work_] = y_dot[work_] - power;
+  F[dissipated_] = y_dot[dissipated_] - loss;
 }
 
 void Equations::row_violations(double t, const double* y, double* g, double* g_dot) const {

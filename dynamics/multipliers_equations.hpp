@@ -81,7 +81,8 @@ class Equations {
   int size() const { return size_; }                                   // of y
   int motion() const { return motion_; }                               // y begins with this much of bodies and wheels
   int wheel(size_t i) const { return wheels_ + static_cast<int>(i); }  // axial angular momentum [N m s]
-  int supplied() const { return supplied_; }
+  int work() const { return work_; }                                   // of loads, prescribed motions and wheels [J]
+  int dissipated() const { return dissipated_; }                       // by all dampers [J]
   int freedoms() const { return freedoms_; }
   int all_rows() const { return all_rows_; }  // kept or not
 
@@ -140,7 +141,7 @@ class Equations {
   const Multibody& scene_;
   std::vector<JointData> joints_;
   std::vector<BodyPlaces> places_;
-  int size_ = 0, motion_ = 0, wheels_ = 0, supplied_ = 0, freedoms_ = 0, all_rows_ = 0;
+  int size_ = 0, motion_ = 0, wheels_ = 0, work_ = 0, dissipated_ = 0, freedoms_ = 0, all_rows_ = 0;
   Eigen::VectorXd inverse_metric_;
   std::unique_ptr<EquationScratch> scratch_;
 };

@@ -1,12 +1,11 @@
 #include "dynamics/crossing.hpp"
 #include "dynamics/ida.hpp"
 #include "dynamics/multipliers.hpp"
+#include "dynamics/multipliers_balance.hpp"
 #include "dynamics/multipliers_scales.hpp"
 #include "dynamics/multipliers_start.hpp"
-#include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
-#include "reduction/root_loads.hpp"
 
 #include <fmt/format.h>
 
@@ -15,8 +14,6 @@
 
 namespace flexboom {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 using Eigen::VectorXd;
 using namespace redundant;
 
@@ -55,7 +52,7 @@ class MultipliersFlight final : public DaeProblem {
     start_on_constraints(start);
     begin_contacts();
     equations_.make_consistent(0, y_, y_dot_, memory_);
-    const Balance b = balance_of(y_);
+    const Balance b = balance_of(equations_, y_, memory_);
     scales_ = std::make_unique<StateScales>(equations_, y_, y_dot_, std::abs(b.kinetic) + std::abs(b.elastic),
                                             local_share * options.tolerance, options.duration);
     record_pattern();
@@ -76,7 +73,7 @@ class MultipliersFlight final : public DaeProblem {
   VectorXd differential() const override {
     VectorXd id = VectorXd::Zero(size());
     id.head(equations_.motion()).setOnes();
-    id[equations_.supplied()] = 1;
+    id[equations_.work()] = id[equations_.dissipated()] = 1;
     return id;
   }
   void residual(double t, const double* y, const double* y_dot, double* F) override {
@@ -139,11 +136,12 @@ class MultipliersFlight final : public DaeProblem {
                                  place ? v.position : v.angle, place ? metres : radians));
   }
 
-  /// Angles near what the mechanism wants, stops closed beyond their threshold; on it by where the joint goes.
+  /// Angles near what was asked for, stops closed beyond their threshold; on it by where the joint goes.
   void begin_contacts() {
     for (size_t i = 0; i < scene_.joints.size(); ++i) {
       const HingeMechanism& m = scene_.joints[i].mechanism;
-      memory_.near[i] = m.rest - m.threshold;
+      const double angle = options_.angles.empty() ? m.rest : options_.angles[i];
+      memory_.near[i] = angle - m.threshold;
     }
     follow_turns();
     VectorXd y = y_;
@@ -186,7 +184,7 @@ class MultipliersFlight final : public DaeProblem {
     before_.resize(stops_.size());
     for (size_t i = 0; i < stops_.size(); ++i) before_[i] = clearance(i, y_);
     try {
-      ida_->step(options_.duration, t_, y_, crossed_);
+      ida_->step(limit(), t_, y_, crossed_);
     } catch (const NumericalError& error) {
       if (constraint_rank(equations_, t_, y_.data()).margin < 3e-2 * margin_) throw_locked();
       throw;
@@ -200,7 +198,7 @@ class MultipliersFlight final : public DaeProblem {
     scales_->observe(y_);
     follow_turns();
     watch_constraints();
-    if (switch_contacts()) {
+    if (switch_contacts() || at_corner()) {
       equations_.project(t_, y_);
       equations_.make_consistent(t_, y_, y_dot_, memory_);
       ida_->restart(t_, y_, y_dot_);
@@ -208,6 +206,23 @@ class MultipliersFlight final : public DaeProblem {
     }
     if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
   }
+
+  /// Where the next step must end at the latest. What is nearer than round-off is reached.
+  double limit() const {
+    const double reached = t_ + round_off();
+    double end = options_.duration;
+    const auto corner = std::upper_bound(options_.corners.begin(), options_.corners.end(), reached);
+    if (corner != options_.corners.end()) end = std::min(end, *corner);
+    if (const double output = output_time(); options_.step_to_outputs && output > reached) end = std::min(end, output);
+    return end;
+  }
+
+  bool at_corner() const {
+    return std::any_of(options_.corners.begin(), options_.corners.end(),
+                       [this](double c) { return std::abs(c - t_) <= round_off(); });
+  }
+
+  double round_off() const { return 1e-14 * options_.duration; }
 
   [[noreturn]] void throw_locked() {
     throw NumericalError(fmt::format("joint \"{}\" locks at t = {:.6g} s: the joints leave no consistent velocity",
@@ -333,6 +348,8 @@ class MultipliersFlight final : public DaeProblem {
     equations_.make_consistent(t, y, y_dot, memory_);
     MultibodyState s;
     s.bodies = equations_.unpack(y.data());
+    for (const BodyPlaces& at : equations_.places())
+      s.accelerations.push_back({y_dot.segment<3>(at.v), y_dot.segment<3>(at.w)});
     for (size_t i = 0; i < scene_.joints.size(); ++i) {
       const JointKind kind = scene_.joints[i].kind;
       DriveMotion<double> c;
@@ -345,49 +362,10 @@ class MultipliersFlight final : public DaeProblem {
       const ReactionWheel& w = scene_.wheels[i];
       s.spin.push_back(y[equations_.wheel(i)] / w.inertia - w.axis.dot(s.bodies[static_cast<size_t>(w.body)].omega));
     }
-    s.supplied = y[equations_.supplied()];
+    s.work = y[equations_.work()], s.dissipated = y[equations_.dissipated()];
     result_.time.push_back(t);
     result_.states.push_back(std::move(s));
-    result_.balance.push_back(balance_of(y));
-  }
-
-  Balance balance_of(const VectorXd& y) {
-    Balance b;
-    double m = 0;
-    Vector3d first_moment = Vector3d::Zero();
-    const std::vector<BodyState> states = equations_.unpack(y.data());
-    for (size_t i = 0; i < states.size(); ++i) {
-      const BodyState& s = states[i];
-      const ReducedBody& body = scene_.bodies[i];
-      const Matrix3d A = rotation_matrix(s.attitude);
-      BodyMomenta of = momenta(body, {.v = A.transpose() * s.velocity, .omega = s.omega, .q = s.q, .q_dot = s.q_dot});
-      for (size_t k = 0; k < scene_.wheels.size(); ++k) {
-        const ReactionWheel& w = scene_.wheels[k];
-        if (w.body != static_cast<int>(i)) continue;
-        const double h = y[equations_.wheel(k)];
-        of.angular += h * w.axis;
-        of.kinetic += h * h / (2 * w.inertia);
-      }
-      const Vector3d P = A * of.linear, H = A * of.angular;
-      b.kinetic += of.kinetic;
-      b.momentum += P;
-      b.momentum_scale += P.norm();
-      b.angular_momentum += H + s.position.cross(P);
-      b.angular_momentum_scale += H.norm();
-      m += body.m;
-      first_moment += body.m * s.position + A * (body.mc0 + body.Ct * s.q);
-    }
-    b.angular_momentum -= (first_moment / m).cross(b.momentum);
-    b.elastic = equations_.potential(y.data(), memory_);
-    return b;
-  }
-
-  bool isolated() const {
-    if (!scene_.loads.empty() || !scene_.gravity.isZero(0)) return false;
-    for (const Joint& j : scene_.joints)
-      if (j.kind != JointKind::free && (j.a.body < 0 || j.b.body < 0)) return false;
-    return std::none_of(scene_.springs.begin(), scene_.springs.end(),
-                        [](const SpringDamper& s) { return s.a.body < 0 || s.b.body < 0; });
+    result_.balance.push_back(balance_of(equations_, y, memory_));
   }
 
   void finish(double seconds) {
@@ -397,19 +375,7 @@ class MultipliersFlight final : public DaeProblem {
     s.newton_iterations = c.newton_iterations, s.error_test_failures = c.error_test_failures;
     s.convergence_failures = c.convergence_failures;
     s.seconds = seconds;
-    const Balance& first = result_.balance.front();
-    double energy = 0, gap = 0, dP = 0, dH = 0, P = 0, H = 0;
-    for (size_t i = 0; i < result_.time.size(); ++i) {
-      const Balance& b = result_.balance[i];
-      energy = std::max(energy, std::abs(b.kinetic) + std::abs(b.elastic));
-      gap = std::max(gap, std::abs(b.kinetic + b.elastic - first.kinetic - first.elastic - result_.states[i].supplied));
-      dP = std::max(dP, (b.momentum - first.momentum).norm());
-      dH = std::max(dH, (b.angular_momentum - first.angular_momentum).norm());
-      P = std::max(P, b.momentum_scale);
-      H = std::max(H, b.angular_momentum_scale);
-    }
-    s.energy_balance = energy > 0 ? gap / energy : 0;
-    if (isolated()) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
+    set_drifts(scene_, result_);
   }
 
   Equations equations_;
@@ -435,6 +401,8 @@ class MultipliersFlight final : public DaeProblem {
 MultibodyTrajectory integrate_multipliers(const Multipliers& system, const std::vector<BodyState>& start,
                                           const MultipliersOptions& options) {
   check_options(options);
+  require(options.angles.empty() || options.angles.size() == system.multibody().joints.size(),
+          "one angle per joint is needed");
   return MultipliersFlight(system, start, options).fly();
 }
 

@@ -169,30 +169,30 @@ DriveMotion<T> joint_gap(bool hinge, double threshold, const PlaceMotion<T>& a, 
   return {angle, dot(z, b.omega - a.omega)};
 }
 
-/// Spring, damper and stop of a hinge or slider.
+/// Spring, damper and stop of a hinge or slider; adds what the damper takes.
 template <class T>
 void act_mechanism(const JointData& joint, const HingeMechanism& m, bool hinge, bool contact, double near,
                    const PairMotion<T>& x, const PlaceMotion<T>& a, const PlaceMotion<T>& b, PairForces<T>& out,
-                   T& power) {
+                   T& loss) {
   const DriveMotion<T> c = joint_gap(hinge, m.threshold, a, b, near);
   T push = m.stiffness * ((m.rest - m.threshold) - c.value) - m.damping * c.rate;
   if (contact) push -= m.stop_stiffness * c.value;
   const Vec3<T> along = push * Vec3<T>{a.axes.row[0].z, a.axes.row[1].z, a.axes.row[2].z};
   add_pair(joint, x, a, b, hinge ? Vec3<T>{} : along, hinge ? along : Vec3<T>{}, out);
-  power -= m.damping * (c.rate * c.rate);
+  loss += m.damping * (c.rate * c.rate);
 }
 
-/// Spring and damper along the line between the places.
+/// Spring and damper along the line between the places; adds what the damper takes.
 template <class T>
 void act_spring(const JointData& places, const SpringDamper& spring, const PairMotion<T>& x, const PlaceMotion<T>& a,
-                const PlaceMotion<T>& b, PairForces<T>& out, T& power) {
+                const PlaceMotion<T>& b, PairForces<T>& out, T& loss) {
   using std::sqrt;
   const Vec3<T> d = b.r - a.r;
   const T length = sqrt(dot(d, d));
   const T rate = dot(d, b.r_dot - a.r_dot) / length;
   const T pull = (spring.stiffness * (length - spring.free_length) + spring.damping * rate) / length;
   add_pair(places, x, a, b, -(pull * d), Vec3<T>{}, out);
-  power -= spring.damping * (rate * rate);
+  loss += spring.damping * (rate * rate);
 }
 
 }  // namespace flexboom::redundant

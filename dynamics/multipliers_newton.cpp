@@ -107,10 +107,10 @@ void seed(PairMotion<Lanes>& x, const Direction& d, int lane) {
 struct PairResult {
   PairForces<Lanes> forces;
   std::array<Lanes, 6> g{}, g_dot{};
-  Lanes power;
+  Lanes power, loss;
 };
 
-/// Rows: forces on a (R, w, s, phi: 12), on b (12), g, g_dot, power. Columns: directions of a, of b.
+/// Rows: forces on a (R, w, s, phi: 12), on b (12), g, g_dot, power, loss. Columns: directions of a, of b.
 template <class Evaluate>
 MatrixXd pair_derivatives(const JointData& j, const PairMotion<double>& x, bool velocities, const Evaluate& evaluate) {
   std::vector<Direction> directions;
@@ -124,7 +124,7 @@ MatrixXd pair_derivatives(const JointData& j, const PairMotion<double>& x, bool 
     }
   }
   const Index m = static_cast<Index>(j.rows.size());
-  MatrixXd L = MatrixXd::Zero(25 + 2 * m, 2 * side_size);
+  MatrixXd L = MatrixXd::Zero(26 + 2 * m, 2 * side_size);
   const PairMotion<Lanes> base = lifted_pair(x);
   for (size_t first = 0; first < directions.size(); first += 8) {
     const size_t count = std::min<size_t>(8, directions.size() - first);
@@ -143,6 +143,7 @@ MatrixXd pair_derivatives(const JointData& j, const PairMotion<double>& x, bool 
         L(24 + m + i, column) = r.g_dot[static_cast<size_t>(i)].d[lane];
       }
       L(24 + 2 * m, column) = r.power.d[lane];
+      L(25 + 2 * m, column) = r.loss.d[lane];
     }
   }
   for (const Index group : {0, 12}) L.middleCols(group, 3) = -L.middleCols(side_size + group, 3);
@@ -246,11 +247,11 @@ void Equations::body_newton(size_t i, double t, double c, const double* y, const
     out.add_block(at.w, wheel(k), column);
     out.add(wheel(k), wheel(k), c);
     const double torque = wheel_k.torque ? wheel_k.torque(t) : 0.0;
-    out.add(supplied_, wheel(k), -torque / wheel_k.inertia);
-    out.add_block(supplied_, at.w, torque * wheel_k.axis.transpose());
+    out.add(work_, wheel(k), -torque / wheel_k.inertia);
+    out.add_block(work_, at.w, torque * wheel_k.axis.transpose());
   }
   out.add_block(at.v, at.v, V);
-  if (n > 0) out.add_block(supplied_, at.u, 2 * Map<const VectorXd>(y + at.u, n).transpose() * body.De);
+  if (n > 0) out.add_block(dissipated_, at.u, -2 * Map<const VectorXd>(y + at.u, n).transpose() * body.De);
 }
 
 void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velocities, const double* y, Assembly& out) {
@@ -273,8 +274,10 @@ void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velociti
       out.add_block(on.v, at.R, MatrixXd(-T * of_positions.middleRows(row, 12)));
       if (velocities) out.add_block(on.v, at.v, MatrixXd(-T * of_velocities.middleRows(row, 12)));
     }
-    out.add_block(supplied_, at.R, -of_positions.row(24 + 2 * m));
-    if (velocities) out.add_block(supplied_, at.v, -of_velocities.row(24 + 2 * m));
+    for (const auto& [energy, row] : {std::pair(work_, 24 + 2 * m), std::pair(dissipated_, 25 + 2 * m)}) {
+      out.add_block(energy, at.R, -of_positions.row(row));
+      if (velocities) out.add_block(energy, at.v, -of_velocities.row(row));
+    }
     const MatrixXd G = L.block(24, first, m, 12) * V;
     const Map<const VectorXd> metric(inverse_metric_.data() + at.freedom, 6 + at.n);
     for (Index i = 0; i < m; ++i) {
@@ -310,14 +313,14 @@ void Equations::newton(double t, double c, const double* y, const double* y_dot,
       constrain(j, x, a, b, of, r.g.data(), r.g_dot.data(), r.forces, nullptr, r.power);
       if (j.mechanism)
         act_mechanism(j, joint.mechanism, joint.kind == JointKind::hinge, memory.closed[i], memory.near[i], x, a, b,
-                      r.forces, r.power);
+                      r.forces, r.loss);
       return r;
     });
     pair_newton(j, L, damped, y, out);
     const PairMotion<double> now = pair(j, t, y, &joint);
     for (const Row& r : j.rows)
       if (r.kept && r.drive != Row::Drive::none)
-        out.add(supplied_, r.lambda,
+        out.add(work_, r.lambda,
                 -row_vectors(r, place_motion(j.a, now.frame_a, now.elastic_a),
                              place_motion(j.b, now.frame_b, now.elastic_b), now.drive)
                      .power);
@@ -328,7 +331,7 @@ void Equations::newton(double t, double c, const double* y, const double* y_dot,
     const MatrixXd L = pair_derivatives(j, pair(j, t, y, nullptr), damped, [&](const PairMotion<Lanes>& x) {
       PairResult r;
       act_spring(j, scene_.springs[i], x, place_motion(j.a, x.frame_a, x.elastic_a),
-                 place_motion(j.b, x.frame_b, x.elastic_b), r.forces, r.power);
+                 place_motion(j.b, x.frame_b, x.elastic_b), r.forces, r.loss);
       return r;
     });
     pair_newton(j, L, damped, y, out);
@@ -349,7 +352,7 @@ void Equations::newton(double t, double c, const double* y, const double* y_dot,
     });
     pair_newton(j, L, true, y, out);
   }
-  out.add(supplied_, supplied_, c);
+  for (const int energy : {work_, dissipated_}) out.add(energy, energy, c);
 }
 
 MatrixXd Equations::gradient(double t, const double* y) {

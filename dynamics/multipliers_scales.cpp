@@ -11,13 +11,26 @@ using Eigen::Vector3d;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
 
+namespace {
+
+/// What a start says of the energies to come: its own; where nothing moves or pushes yet, that of bodies going a
+/// hundredth of their size per second.
+double energy_scale(const Multibody& scene, double at_start, const VectorXd& y_dot) {
+  if (at_start > 0 || !y_dot.isZero(0)) return std::max(at_start, 1e-30);
+  double E = 0;
+  for (const ReducedBody& b : scene.bodies) E += 0.5e-4 * b.J0.trace();
+  return E;
+}
+
+}  // namespace
+
 StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorXd& y0_dot, double energy,
                          double tolerance, double duration)
     : equations_(equations), tolerance_(tolerance), start_(y0) {
   constexpr double part = 1e-3, round_off = 4e-15;
   scale_ = VectorXd::Constant(y0.size(), 1e100);
   least_ = VectorXd::Zero(y0.size());
-  const double time = std::min(1.0, 0.01 * duration), E = std::max(energy, 1e-30);
+  const double time = std::min(1.0, 0.01 * duration), E = energy_scale(equations.scene(), energy, y0_dot);
   const auto& places = equations.places();
   double length = 0;  // [m]: positions are known to round-off of this
   for (const BodyPlaces& at : places) length = std::max(length, y0.segment<3>(at.R).norm());
@@ -49,7 +62,7 @@ StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorX
     scale_[equations.wheel(i)] =
         std::max({part * std::sqrt(2 * E * wheel.inertia), std::abs(y0[equations.wheel(i)]), 1e-30});
   }
-  scale_[equations.supplied()] = E;
+  scale_[equations.work()] = scale_[equations.dissipated()] = E;
   observe(y0);
 }
 
@@ -72,7 +85,7 @@ void StateScales::observe(const VectorXd& y) {
   }
   for (size_t i = 0; i < equations_.scene().wheels.size(); ++i)
     raise(equations_.wheel(i), 1, std::abs(y[equations_.wheel(i)]));
-  raise(equations_.supplied(), 1, std::abs(y[equations_.supplied()]));
+  for (const int energy : {equations_.work(), equations_.dissipated()}) raise(energy, 1, std::abs(y[energy]));
 }
 
 void StateScales::weights(double* w) const {

@@ -215,7 +215,7 @@ double Equations::project(double t, VectorXd& y) {
 void Equations::make_consistent(double t, VectorXd& y, VectorXd& y_dot, const JointMemory& memory) {
   const std::vector<Index> kept = kept_rows(*this);
   const Index m = static_cast<Index>(kept.size()), n = freedoms_;
-  y.segment(motion_, supplied_ - motion_).setZero();
+  y.segment(motion_, work_ - motion_).setZero();
   y_dot = VectorXd::Zero(size_);
   VectorXd F(size_);
   residual(t, y.data(), y_dot.data(), memory, F.data());
@@ -257,9 +257,9 @@ void Equations::make_consistent(double t, VectorXd& y, VectorXd& y_dot, const Jo
   for (const JointData& j : joints_)
     for (const Row& r : j.rows)
       if (r.kept) y[r.lambda] = x[row++];
-  residual(t, y.data(), y_dot.data(), memory, F.data());  // what is left: rates of the wheels and of the supplied work
+  residual(t, y.data(), y_dot.data(), memory, F.data());  // what is left: rates of the wheels and of the energies
   for (size_t i = 0; i < scene_.wheels.size(); ++i) y_dot[wheel(i)] = -F[wheel(i)];
-  y_dot[supplied_] = -F[supplied_];
+  for (const int energy : {work_, dissipated_}) y_dot[energy] = -F[energy];
 }
 
 }  // namespace flexboom::redundant

@@ -3,7 +3,6 @@
 #include "reduction/geometric_stiffness.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -164,16 +163,6 @@ MatrixXd stiffness_of_motion(const ReducedBody& body, const tree::Link& link, co
                           eigen(transposed_product(A, s.acceleration.w)));
 }
 
-/// Adds Kg of a load (force, torque; BRF axes) on a marker.
-void add_marker_load(const ReducedBody& body, const std::string& marker, const Vector3d& force, const Vector3d& torque,
-                     MatrixXd& K) {
-  for (const MarkerStiffness& m : body.Kg.markers) {
-    if (m.marker != marker) continue;
-    for (size_t i = 0; i < m.force.size(); ++i) K += force[static_cast<int>(i)] * m.force[i];
-    for (size_t i = 0; i < m.torque.size(); ++i) K += torque[static_cast<int>(i)] * m.torque[i];
-  }
-}
-
 }  // namespace
 
 std::vector<double> Tree::stiffening_effect(double t, const Eigen::Ref<const VectorXd>& y,
@@ -190,18 +179,13 @@ std::vector<double> Tree::stiffening_effect(double t, const Eigen::Ref<const Vec
     const tree::Link& parent = model.links[static_cast<size_t>(link.parent)];
     const tree::Twist<double> load = tree::joint_load(s);
     const Vec3<double> F = -(s.A * load.t), M = -(s.A * load.w) + cross(s.lever, F);
-    add_marker_load(impl_->scene.bodies[static_cast<size_t>(parent.index)],
-                    impl_->scene.joints[static_cast<size_t>(link.joint)].a.marker,
-                    eigen(transposed_product(parent.brf_axes, F)), eigen(transposed_product(parent.brf_axes, M)),
-                    K[static_cast<size_t>(parent.index)]);
+    K[static_cast<size_t>(parent.index)] +=
+        marker_stiffness(impl_->scene.bodies[static_cast<size_t>(parent.index)],
+                         impl_->scene.joints[static_cast<size_t>(link.joint)].a.marker,
+                         eigen(transposed_product(parent.brf_axes, F)), eigen(transposed_product(parent.brf_axes, M)));
   }
-  std::vector<double> effect(impl_->scene.bodies.size(), 0.0);
-  for (size_t i = 0; i < effect.size(); ++i) {
-    const ReducedBody& body = impl_->scene.bodies[i];
-    if (body.n() == 0 || K[i].isZero(0)) continue;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(K[i], body.Ke, Eigen::EigenvaluesOnly);
-    if (solver.info() == Eigen::Success) effect[i] = solver.eigenvalues().cwiseAbs().maxCoeff();
-  }
+  std::vector<double> effect;
+  for (size_t i = 0; i < K.size(); ++i) effect.push_back(relative_stiffness(impl_->scene.bodies[i], K[i]));
   return effect;
 }
 

@@ -180,4 +180,21 @@ MatrixXd motion_stiffness(const ReducedBody& body, const Vector3d& omega, const 
   return K;
 }
 
+MatrixXd marker_stiffness(const ReducedBody& body, const std::string& marker, const Vector3d& force,
+                          const Vector3d& torque) {
+  MatrixXd K = MatrixXd::Zero(body.n(), body.n());
+  for (const MarkerStiffness& m : body.Kg.markers) {
+    if (m.marker != marker) continue;
+    for (size_t i = 0; i < m.force.size(); ++i) K += force[static_cast<Index>(i)] * m.force[i];
+    for (size_t i = 0; i < m.torque.size(); ++i) K += torque[static_cast<Index>(i)] * m.torque[i];
+  }
+  return K;
+}
+
+double relative_stiffness(const ReducedBody& body, const MatrixXd& Kg) {
+  if (body.n() == 0 || Kg.isZero(0)) return 0;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(Kg, body.Ke, Eigen::EigenvaluesOnly);
+  return solver.info() == Eigen::Success ? solver.eigenvalues().cwiseAbs().maxCoeff() : 0;
+}
+
 }  // namespace flexboom

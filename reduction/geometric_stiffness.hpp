@@ -42,4 +42,11 @@ Eigen::MatrixXd motion_stiffness(const ReducedBody&, const Eigen::Vector3d& omeg
                                  const Eigen::Vector3d& acceleration = Eigen::Vector3d::Zero(),
                                  const Eigen::Vector3d& angular_acceleration = Eigen::Vector3d::Zero());
 
+/// The same of a force [N] and a torque [N m] on a marker, BRF axes.
+Eigen::MatrixXd marker_stiffness(const ReducedBody&, const std::string& marker, const Eigen::Vector3d& force,
+                                 const Eigen::Vector3d& torque);
+
+/// Size of a geometric stiffness against the body's own: the largest |eigenvalue| in the metric of Ke.
+double relative_stiffness(const ReducedBody&, const Eigen::MatrixXd& Kg);
+
 }  // namespace flexboom

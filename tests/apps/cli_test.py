@@ -176,7 +176,8 @@ class BadInput(Case):
 
     def test_choices_of_other_versions(self):
         self.assert_run_refused("--structure", "solid", words="solid")
-        self.assert_run_refused("--formulation", "multipliers", words="multipliers")
+        self.assert_run_refused("--formulation", "multipliers", "--integrator", "bdf", words="integrator.method")
+        self.assert_run_refused("--formulation", "redundant", words="multipliers")
 
     def test_unknown_choices_list_what_there_is(self):
         self.assert_run_refused("--integrator", "nonsense", words='"bdf"')
@@ -475,12 +476,23 @@ class TreeScenes(Case):
         return folder
 
     def test_every_built_in_scene_flies(self):
-        for name in ("tumbling", "spin-up", "two-link-arm", "flexible-appendage", "wire-spinner", "panel-slew"):
+        for name in ("tumbling", "spin-up", "two-link-arm", "flexible-appendage", "wire-spinner", "panel-slew",
+                     "slider-crank"):
             folder = self.run_scene(name, "--duration", "0.2", out=name)
             values = columns(folder / "trajectory.csv")
             self.assertAlmostEqual(values["t"][-1], 0.2)
             self.assertTrue(all(np.isfinite(v).all() for v in values.values()), name)
             self.assertLess(self.summary(folder)["energy_balance"], 1e-3, name)
+
+    def test_closed_loop_has_every_file(self):
+        folder = self.run_scene("slider-crank", "--duration", "0.02", "--vtu-step", "0.01", "--report")
+        self.assertIn("wrist.angle", read_csv(folder / "trajectory.csv")[0])
+        summary = self.summary(folder)
+        self.assertEqual(summary["integrator"], "ida")
+        self.assertLess(summary["constraint_drift"], 1e-12)
+        self.assertTrue(any("constraint rows" in w and 'joint "wrist"' in w for w in summary["warnings"]))
+        self.assertTrue((folder / "motion_00002.vtu").exists())
+        self.assertIn("Sliders", (folder / "report.html").read_text())
 
     def test_files_and_columns(self):
         folder = self.run_scene("flexible-appendage", "--duration", "1", "--vtu-step", "0.5", "--report")
@@ -534,7 +546,7 @@ class TreeScenes(Case):
 
     def test_what_trees_cannot_do_is_said(self):
         for arguments, words in ((("--integrator", "exponential"), "integrator.method"),
-                                 (("--formulation", "multipliers"), "not available"),
+                                 (("--formulation", "multipliers", "--integrator", "adams"), "integrator.method"),
                                  (("--modes", "3"), "no boom")):
             result = flexboom("run", "tumbling", *arguments)
             self.assert_exit(INPUT, result)

@@ -378,7 +378,9 @@ TEST(Scene, ValidateFindsWhatAnOverrideBreaks) {
   EXPECT_NE(broken([](Scene& s) { s.bodies[1].modes = 5000; }).find("bodies[1].modes: is 5000, but the mesh has only"),
             std::string::npos);
   EXPECT_NE(broken([](Scene& s) { s.integrator = "bfd"; }).find("did you mean \"bdf\"?"), std::string::npos);
-  EXPECT_NE(broken([](Scene& s) { s.formulation = "multipliers"; }).find("not available in this version"),
+  EXPECT_EQ(broken([](Scene& s) { s.formulation = "multipliers", s.integrator = "bdf"; }),
+            "integrator.method: is \"bdf\"; it must be \"auto\" or \"ida\"");
+  EXPECT_NE(broken([](Scene& s) { s.formulation = "redundant"; }).find("\"relative\" or \"multipliers\""),
             std::string::npos);
 }
 

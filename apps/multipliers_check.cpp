@@ -1,0 +1,22 @@
+// What formulation = "multipliers" cannot do, refused under the key that asks for it.
+
+#include "apps/scene.hpp"
+#include "apps/scene_keys.hpp"
+
+#include <fmt/format.h>
+
+namespace flexboom {
+
+void check_multipliers(const Scene& scene, toml_reader::Faults& faults) {
+  constexpr const char* relative = "; formulation = \"relative\" can";
+  if (scene.rescale_at_events)
+    faults.add("integrator.rescale_at_events", fmt::format("is true, which \"multipliers\" cannot follow{}", relative));
+  if (scene.orbit && scene.orbit->gravity == "differential")
+    faults.add("orbit.gravity", fmt::format("is \"differential\", which \"multipliers\" leave out{}", relative));
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].stiffening == "on")
+      faults.add(fmt::format("bodies[{}].stiffening", i),
+                 fmt::format("is \"on\", but \"multipliers\" leave geometric stiffness out{}", relative));
+}
+
+}  // namespace flexboom

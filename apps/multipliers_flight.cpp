@@ -1,0 +1,217 @@
+// Scenes in redundant coordinates: start, flight, and what results are made of in terms of the tree.
+
+#include "apps/multipliers_flight.hpp"
+
+#include "apps/tree_flight.hpp"
+#include "dynamics/formulations.hpp"
+#include "dynamics/multibody_of.hpp"
+#include "fem/stopwatch.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <memory>
+#include <numbers>
+#include <utility>
+
+namespace flexboom {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Angles where the hinges start: a turn more is another stretch of their springs.
+std::vector<double> start_angles(const Multibody& scene, const TreeState& start) {
+  std::vector<double> angles;
+  auto of_tree = start.joints.begin();
+  for (const Joint& j : scene.joints) {
+    angles.push_back(j.mechanism.rest);
+    if (j.closes_loop) continue;
+    if (!of_tree->coordinate.empty()) angles.back() = of_tree->coordinate[0];
+    ++of_tree;
+  }
+  return angles;
+}
+
+MultipliersOptions multipliers_options(const IntegratorOptions& o, std::vector<double> angles) {
+  MultipliersOptions r;
+  r.tolerance = o.tolerance, r.duration = o.duration, r.output_step = o.output_step;
+  r.settle = o.settle;
+  r.angles = std::move(angles);
+  r.corners = o.corners, r.step_to_outputs = o.step_to_outputs;
+  r.max_steps = o.max_steps;
+  r.interrupt = o.interrupt, r.progress = o.progress;
+  return r;
+}
+
+IntegrationSummary summary_of(const MultipliersSummary& s) {
+  IntegrationSummary r;
+  r.method = "ida";
+  r.steps = s.steps, r.rhs_evaluations = s.residual_evaluations, r.jacobian_evaluations = s.factorisations;
+  r.factorisations = s.factorisations, r.newton_iterations = s.newton_iterations;
+  r.error_test_failures = s.error_test_failures, r.restarts = s.restarts;
+  r.seconds = s.seconds;
+  r.energy_balance = s.energy_balance, r.momentum_drift = s.momentum_drift;
+  r.constraint_drift = std::max({s.position_drift, s.angle_drift, s.quaternion_drift});
+  r.settled = s.settled;
+  r.interrupted = s.interrupted;
+  return r;
+}
+
+/// Joints number from `first`.
+std::vector<Event> events_of(const std::vector<StopEvent>& crossings, int first) {
+  std::vector<Event> events;
+  for (const StopEvent& e : crossings) events.push_back({e.time, e.joint - first, e.contact, e.rate});
+  return events;
+}
+
+Scene without_loops(Scene scene) {
+  std::erase_if(scene.joints, [](const JointScene& j) { return j.closes_loop; });
+  return scene;
+}
+
+TreeState without_loops(const Scene& scene, TreeState s) {
+  std::vector<JointState> joints;
+  for (size_t i = 0; i < scene.joints.size(); ++i)
+    if (!scene.joints[i].closes_loop) joints.push_back(std::move(s.joints[i]));
+  s.joints = std::move(joints);
+  return s;
+}
+
+/// The turns of universal joints nearest to the outputs before.
+void follow_turns(const TreeState& before, TreeState& s) {
+  constexpr double turn = 2 * std::numbers::pi;
+  for (size_t i = 0; i < s.joints.size(); ++i)
+    for (size_t k = 0; s.joints[i].coordinate.size() == 2 && k < 2; ++k) {
+      double& angle = s.joints[i].coordinate[k];
+      angle += turn * std::round((before.joints[i].coordinate[k] - angle) / turn);
+    }
+}
+
+std::vector<TreeState> states_of(const Multipliers& system, const MultibodyTrajectory& flight) {
+  std::vector<TreeState> states;
+  for (const MultibodyState& m : flight.states) {
+    TreeState s = tree_state(system, m);
+    if (!states.empty()) follow_turns(states.back(), s);
+    states.push_back(std::move(s));
+  }
+  return states;
+}
+
+/// Energies as the tree has them: the potential of gravity apart, mechanisms of loops among the elastic ones.
+TreeBalance balance_of(const Tree& tree, const MultibodyTrajectory& flight, size_t row, const VectorXd& y) {
+  TreeBalance b;
+  b.kinetic = flight.balance[row].kinetic;
+  b.potential = tree.balance(flight.time[row], y).potential;
+  b.elastic = flight.balance[row].elastic - b.potential;
+  b.dissipated = flight.states[row].dissipated, b.work = flight.states[row].work;
+  return b;
+}
+
+/// At every output of a short list, at some of a long one.
+std::vector<double> largest_stiffening(const Multipliers& system, const MultibodyTrajectory& flight) {
+  std::vector<double> largest(system.multibody().bodies.size(), 0.0);
+  const size_t stride = flight.states.size() / 500 + 1;
+  for (size_t row = 0; row < flight.states.size(); row += stride) {
+    const std::vector<double> effect = stiffening_effect(system, flight.states[row]);
+    for (size_t b = 0; b < effect.size(); ++b) largest[b] = std::max(largest[b], effect[b]);
+  }
+  return largest;
+}
+
+std::vector<std::string> warnings_of(const Scene& scene, const MultibodyTrajectory& flight,
+                                     const std::vector<double>& stiffening) {
+  std::vector<std::string> warnings;
+  if (const auto& rows = flight.summary.redundant; !rows.empty())
+    warnings.push_back(
+        fmt::format("{} constraint rows follow from the others and are left out, so how these joints share such loads "
+                    "is not determined: {}",
+                    rows.size(), fmt::join(rows, "; ")));
+  for (size_t b = 0; b < stiffening.size(); ++b)
+    if (stiffening[b] > scene.tolerance)
+      warnings.push_back(
+          fmt::format("body {}: this formulation leaves its geometric stiffness out; it reaches {:.2g} of its "
+                      "stiffness, more than the tolerance {:.2g}{}",
+                      scene.bodies[b].name, stiffening[b], scene.tolerance,
+                      stiffening[b] > 0.1 ? ": without it the motion can be wrong or diverge" : ""));
+  return warnings;
+}
+
+/// Where closing the loops moved a joint away from the start it was given.
+void note_moved_starts(const Scene& scene, const TreeState& asked, const TreeState& first,
+                       std::vector<std::string>& notes) {
+  for (size_t i = 0, of_tree = 0; i < scene.joints.size(); ++i) {
+    const JointScene& j = scene.joints[i];
+    if (j.closes_loop) continue;
+    const JointState& wanted = asked.joints[of_tree++];
+    for (size_t k = 0; k < wanted.coordinate.size(); ++k)
+      if (std::abs(first.joints[i].coordinate[k] - wanted.coordinate[k]) > scene.tolerance)
+        notes.push_back(fmt::format("joint {}: starts at {:.6g}, not {:.6g}, so that the loops close", j.name,
+                                    first.joints[i].coordinate[k], wanted.coordinate[k]));
+  }
+}
+
+}  // namespace
+
+Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
+  const Stopwatch start;
+  const Multipliers system(make_multibody(scene, bodies));
+  const Scene open = without_loops(scene);
+  Run r;
+  r.tree = std::make_shared<const Tree>(make_multibody(open, bodies));
+  r.bodies = std::move(bodies);
+  VectorXd y0 = r.tree->pack(start_state(open, *r.tree));
+  r.tree->impose(0, y0);
+  const TreeState asked = r.tree->unpack(y0);
+  const std::vector<BodyState> closed = close_joints(system, body_states(*r.tree, 0, y0));
+  IntegratorOptions options = integrator_options(scene, hooks, "ida", max_steps);
+  set_corners(scene, options);
+  r.prepare_seconds = start.seconds();
+
+  const Stopwatch flight_time;
+  MultibodyTrajectory flight =
+      integrate_multipliers(system, closed, multipliers_options(options, start_angles(system.multibody(), asked)));
+  const std::vector<TreeState> states = states_of(system, flight);
+  for (const TreeState& s : states) r.motion.y.push_back(r.tree->pack(without_loops(scene, s)));
+  r.outputs = tree_output_table(scene, *r.tree, flight.time.size(), [&](size_t row) {
+    return TreeMoment{flight.time[row], states[row], joint_loads(system, flight.states[row]),
+                      balance_of(*r.tree, flight, row, r.motion.y[row])};
+  });
+  r.stiffening_effect = largest_stiffening(system, flight);
+  r.stiffening_left_out = r.stiffening_effect.empty() ? 0 : std::ranges::max(r.stiffening_effect);
+  note_moved_starts(scene, asked, states.front(), r.notes);
+  r.warnings = warnings_of(scene, flight, r.stiffening_effect);
+  r.motion.time = std::move(flight.time);
+  r.motion.events = events_of(flight.events, 0);
+  r.motion.summary = summary_of(flight.summary);
+  r.integrate_seconds = flight_time.seconds();
+  return r;
+}
+
+Trajectory integrate_by_multipliers(const Flyable& f, const IntegratorOptions& options) {
+  const Multipliers system(multibody_of(f.system));
+  const Tree tree(multibody_of(f.system));
+  const Index motion = f.system.layout().dissipated();  // up to here both have the same states
+  VectorXd y0 = VectorXd::Zero(tree.layout().size);
+  y0.head(motion) = f.y0.head(motion);
+  MultibodyTrajectory flight =
+      integrate_multipliers(system, body_states(tree, 0, y0),
+                            multipliers_options(options, start_angles(system.multibody(), tree.unpack(y0))));
+  Trajectory r;
+  for (const MultibodyState& s : flight.states) {
+    VectorXd y(f.system.layout().size);
+    y << tree.pack(tree_state(system, s)).head(motion), s.dissipated;
+    r.y.push_back(std::move(y));
+  }
+  r.time = std::move(flight.time);
+  r.balance = std::move(flight.balance);
+  r.events = events_of(flight.events, f.system.fixed_hub() ? 0 : 1);
+  r.summary = summary_of(flight.summary);
+  return r;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,73 @@
+#include "dynamics/multipliers_balance.hpp"
+
+#include "dynamics/rotation.hpp"
+#include "reduction/root_loads.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace flexboom::redundant {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+Balance balance_of(const Equations& equations, const VectorXd& y, const JointMemory& memory) {
+  const Multibody& scene = equations.scene();
+  Balance b;
+  double m = 0;
+  Vector3d first_moment = Vector3d::Zero();
+  const std::vector<BodyState> states = equations.unpack(y.data());
+  for (size_t i = 0; i < states.size(); ++i) {
+    const BodyState& s = states[i];
+    const ReducedBody& body = scene.bodies[i];
+    const Matrix3d A = rotation_matrix(s.attitude);
+    BodyMomenta of = momenta(body, {.v = A.transpose() * s.velocity, .omega = s.omega, .q = s.q, .q_dot = s.q_dot});
+    for (size_t k = 0; k < scene.wheels.size(); ++k) {
+      const ReactionWheel& w = scene.wheels[k];
+      if (w.body != static_cast<int>(i)) continue;
+      const double h = y[equations.wheel(k)];
+      of.angular += h * w.axis;
+      of.kinetic += h * h / (2 * w.inertia);
+    }
+    const Vector3d P = A * of.linear, H = A * of.angular;
+    b.kinetic += of.kinetic;
+    b.momentum += P;
+    b.momentum_scale += P.norm();
+    b.angular_momentum += H + s.position.cross(P);
+    b.angular_momentum_scale += H.norm();
+    m += body.m;
+    first_moment += body.m * s.position + A * (body.mc0 + body.Ct * s.q);
+  }
+  b.angular_momentum -= (first_moment / m).cross(b.momentum);
+  b.elastic = equations.potential(y.data(), memory);
+  return b;
+}
+
+bool is_isolated(const Multibody& scene) {
+  if (!scene.loads.empty() || !scene.gravity.isZero(0)) return false;
+  for (const Joint& j : scene.joints)
+    if (j.kind != JointKind::free && (j.a.body < 0 || j.b.body < 0)) return false;
+  return std::none_of(scene.springs.begin(), scene.springs.end(),
+                      [](const SpringDamper& s) { return s.a.body < 0 || s.b.body < 0; });
+}
+
+void set_drifts(const Multibody& scene, MultibodyTrajectory& r) {
+  MultipliersSummary& s = r.summary;
+  const Balance& first = r.balance.front();
+  double energy = 0, gap = 0, dP = 0, dH = 0, P = 0, H = 0;
+  for (size_t i = 0; i < r.time.size(); ++i) {
+    const Balance& b = r.balance[i];
+    const MultibodyState& at = r.states[i];
+    energy = std::max({energy, std::abs(b.kinetic) + std::abs(b.elastic), std::abs(at.work), at.dissipated});
+    gap = std::max(gap, std::abs(b.kinetic + b.elastic - first.kinetic - first.elastic - at.work + at.dissipated));
+    dP = std::max(dP, (b.momentum - first.momentum).norm());
+    dH = std::max(dH, (b.angular_momentum - first.angular_momentum).norm());
+    P = std::max(P, b.momentum_scale);
+    H = std::max(H, b.angular_momentum_scale);
+  }
+  s.energy_balance = energy > 0 ? gap / energy : 0;
+  if (is_isolated(scene)) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
+}
+
+}  // namespace flexboom::redundant

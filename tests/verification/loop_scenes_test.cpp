@@ -1,0 +1,228 @@
+// The built-in scene with a closed loop, and SPORT, by multipliers: each against what is known of it.
+
+#include "apps/simulate.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::Vector2d;
+using Eigen::VectorXd;
+
+constexpr double pi = std::numbers::pi;
+
+Scene scene_named(const std::string& name) {
+  Scene scene = load_scene(name);
+  scene.error_budget = false;
+  return scene;
+}
+
+VectorXd column(const RunResult& r, const std::string& name) {
+  const auto i = std::find(r.outputs.names.begin(), r.outputs.names.end(), name);
+  require(i != r.outputs.names.end(), "no column " + name);
+  return r.outputs.values.col(i - r.outputs.names.begin());
+}
+
+// ---- SPORT in both formulations ----
+
+TEST(LoopScenes, SportFliesByMultipliersAsInRelativeCoordinates) {
+  Scene scene = scene_named("sport");
+  scene.duration = 0.5;
+  scene.tolerance = 1e-8;
+  for (BodyScene& b : scene.bodies) b.structure = "eq14", b.modes = 2;
+  const RunResult relative = run_scene(scene, {});
+  scene.formulation = "multipliers";
+  const RunResult redundant = run_scene(scene, {});
+  EXPECT_EQ(redundant.outputs.names, relative.outputs.names);
+  ASSERT_EQ(redundant.outputs.values.rows(), relative.outputs.values.rows());
+  for (const OutputDifference& d : compare_outputs(redundant.outputs, relative.outputs, {}))
+    EXPECT_LT(d.error, 1e-7) << d.name;
+  for (const char* energy : {"energy.kinetic", "energy.elastic", "energy.dissipated"}) {
+    const VectorXd a = column(redundant, energy), b = column(relative, energy);
+    EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-7 * b.maxCoeff()) << energy;
+  }
+  const auto &found = redundant.trajectory.events, &wanted = relative.trajectory.events;
+  ASSERT_EQ(found.size(), wanted.size());
+  ASSERT_GT(found.size(), 10u);
+  for (size_t i = 0; i < found.size(); ++i) {
+    EXPECT_NEAR(found[i].time, wanted[i].time, 1e-7) << i;
+    EXPECT_EQ(found[i].hinge, wanted[i].hinge) << i;
+    EXPECT_EQ(found[i].contact, wanted[i].contact) << i;
+  }
+  EXPECT_LT(redundant.trajectory.summary.constraint_drift, 1e-12);
+  EXPECT_LT(redundant.trajectory.summary.momentum_drift, 1e-8);
+}
+
+// ---- slider-crank ----
+
+constexpr double crank = 0.15, rod = 0.3;  // [m]
+
+/// The scene with its crank at another speed [rad/s], damped so that the vibration of the start dies out.
+Scene slider_crank(double speed) {
+  Scene scene = scene_named("slider-crank");
+  scene.joints[0].motion[0].expression = fmt::format("{}*t", speed);
+  scene.joints[1].start_rate = {-speed * (1 + crank / rod)};
+  scene.bodies[1].damping.beta = 1e-4;
+  return scene;
+}
+
+/// A rigid slider-crank at a crank angle: angle of the rod, way of the piston.
+double rod_angle(double angle) { return -std::asin(crank * std::sin(angle) / rod); }
+double piston_way(double angle) { return crank * std::cos(angle) + rod * std::cos(rod_angle(angle)); }
+
+TEST(LoopScenes, RigidSliderCrankGoesAsInClosedForm) {
+  Scene scene = scene_named("slider-crank");
+  const double speed = 50;
+  scene.bodies[1].structure = "rigid";
+  scene.tolerance = 1e-9;
+  const RunResult r = run_scene(scene, {});
+  const VectorXd t = column(r, "t"), way = column(r, "guide.length"), pin = column(r, "pin.angle"),
+                 wrist = column(r, "wrist.angle");
+  double error = 0;
+  for (Index i = 0; i < t.size(); ++i) {
+    const double angle = speed * t[i], phi = rod_angle(angle);
+    error = std::max(
+        {error, std::abs(way[i] - piston_way(angle)), std::abs(pin[i] - (phi - angle)), std::abs(wrist[i] + phi)});
+  }
+  std::printf("rigid slider-crank: %.1e, drift %.1e, energy %.1e\n", error, r.trajectory.summary.constraint_drift,
+              r.trajectory.summary.energy_balance);
+  EXPECT_LT(error, 1e-11);  // the joints decide, not the integration
+  EXPECT_LT(r.trajectory.summary.constraint_drift, 1e-12);
+  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-7);
+}
+
+/// Deflection of the rod from the line between its pins: in the middle [m], and the first half sine in it.
+struct Deflection {
+  VectorXd middle, half_sine;
+};
+
+Deflection found_deflection(const RunResult& r) {
+  const ReducedBody& body = r.bodies[1].body;
+  const Eigen::Matrix3Xd& points = body.display.points;
+  const Index rows = r.outputs.values.rows(), last = points.cols() - 1;
+  Index middle = 0;
+  while (std::abs(points(0, middle) - rod / 2) > 1e-9) require(++middle < last, "no point in the middle");
+  Deflection d{VectorXd::Zero(rows), VectorXd::Zero(rows)};
+  for (Index k = 0; k < body.n(); ++k) {
+    const VectorXd q = column(r, fmt::format("rod.q{}", k + 1));
+    const auto shape = [&](Index i) {  // less what turns the line between the pins
+      const double tip = body.display.S[static_cast<size_t>(last)](1, k);
+      return body.display.S[static_cast<size_t>(i)](1, k) - points(0, i) / rod * tip;
+    };
+    d.middle += shape(middle) * q;
+    for (Index i = 1; i <= last; ++i) {
+      const auto sine = [&](Index j) { return shape(j) * std::sin(pi * points(0, j) / rod); };
+      d.half_sine += (sine(i) + sine(i - 1)) / rod * (points(0, i) - points(0, i - 1)) * q;
+    }
+  }
+  return d;
+}
+
+/// A linear beam on two pins under the inertia of its rigid motion: sines, the first integrated, the rest as they would
+/// be at rest. q_n'' + beta w_n^2 q_n' + (w_n^2 - phi_dot^2) q_n = -2 / (n pi) (a_pin - (-1)^n a_piston), where the
+/// accelerations are those normal to the rod.
+class PinnedBeam {
+ public:
+  PinnedBeam(const BodyScene& body, double speed) : beta_(body.damping.beta), speed_(speed) {
+    const BeamSegment& s = body.geometry.segments[0];
+    const auto& section = std::get<Rectangle>(s.start);
+    w1_ = std::pow(pi / rod, 2) * std::sqrt(s.material.E * std::pow(section.height, 2) / 12 / s.material.rho);
+  }
+
+  Deflection at(const VectorXd& t, VectorXd& tip) {
+    constexpr int steps = 200;
+    Deflection d{VectorXd::Zero(t.size()), VectorXd::Zero(t.size())};
+    tip = VectorXd::Zero(t.size());
+    for (int n = 1; n <= 40; ++n) {
+      Vector2d y(0, 0);
+      for (Index i = 0; i < t.size(); ++i) {
+        const double q = n <= dynamic ? y[0] : load(n, t[i]) / std::pow(n * n * w1_, 2);
+        d.middle[i] += q * std::sin(n * pi / 2);
+        tip[i] -= n * pi * q;  // seen from the tangent at the pin
+        if (n == 1) d.half_sine[i] = q;
+        if (n <= dynamic && i + 1 < t.size()) advance(n, t[i], t[i + 1], steps, y);
+      }
+    }
+    return d;
+  }
+
+ private:
+  static constexpr int dynamic = 3;
+
+  double load(int n, double t) const {
+    const double angle = speed_ * t, phi = rod_angle(angle), h = 1e-4;
+    const Vector2d normal(-std::sin(phi), std::cos(phi));
+    const double pin = -speed_ * speed_ * crank * normal.dot(Vector2d(std::cos(angle), std::sin(angle)));
+    const double way = (piston_way(angle + h) - 2 * piston_way(angle) + piston_way(angle - h)) / (h * h);
+    const double piston = speed_ * speed_ * way * normal.x();
+    return -2 / (n * pi) * (pin - (n % 2 == 0 ? 1 : -1) * piston);
+  }
+
+  void advance(int n, double t0, double t1, int steps, Vector2d& y) const {
+    const double w2 = std::pow(n * n * w1_, 2), h = (t1 - t0) / steps;
+    const auto f = [&](double t, const Vector2d& s) {
+      const double phi_dot = -crank * speed_ * std::cos(speed_ * t) / (rod * std::cos(rod_angle(speed_ * t)));
+      return Vector2d(s[1], load(n, t) - (w2 - phi_dot * phi_dot) * s[0] - beta_ * w2 * s[1]);
+    };
+    for (int k = 0; k < steps; ++k) {
+      const double t = t0 + k * h;
+      const Vector2d a = f(t, y), b = f(t + h / 2, y + h / 2 * a), c = f(t + h / 2, y + h / 2 * b),
+                     e = f(t + h, y + h * c);
+      y += h / 6 * (a + 2 * b + 2 * c + e);
+    }
+  }
+
+  double beta_, speed_, w1_ = 0;
+};
+
+/// Largest differences of the rod's tip and middle from those of the beam, over the largest deflection.
+Vector2d errors_against_pinned_beam(double speed) {
+  const Scene scene = slider_crank(speed);
+  const RunResult r = run_scene(scene, {});
+  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-6);
+  EXPECT_LT(r.trajectory.summary.constraint_drift, 1e-12);
+  VectorXd tip;
+  const Deflection wanted = PinnedBeam(scene.bodies[1], speed).at(column(r, "t"), tip), found = found_deflection(r);
+  const auto error = [](const VectorXd& a, const VectorXd& b) {
+    return (a - b).cwiseAbs().maxCoeff() / b.cwiseAbs().maxCoeff();
+  };
+  const Vector2d e(error(column(r, "rod.tip.y"), tip), error(found.middle, wanted.middle));
+  std::printf("rod at %g rad/s: tip %.2e of %.3e m, middle %.2e of %.3e m\n", speed, e[0], tip.cwiseAbs().maxCoeff(),
+              e[1], wanted.middle.cwiseAbs().maxCoeff());
+  return e;
+}
+
+/// What the beam on pins and the rod in its tangent frame leave out of the geometric stiffness differs: 3.5 % of Ke at
+/// 50 rad/s, in proportion to the square of the speed.
+TEST(LoopScenes, RodBendsAsABeamOnTwoPins) {
+  const Vector2d slow = errors_against_pinned_beam(50), fast = errors_against_pinned_beam(100);
+  EXPECT_LT(slow[0], 0.02);
+  EXPECT_LT(slow[1], 0.01);
+  EXPECT_GT(fast[1] / slow[1], 3);
+}
+
+/// At the speed of the source, where the loads reach 5 % of what buckles the rod. The source has a linear rod without
+/// damping, and longitudinal modes; its start is without vibration.
+TEST(LoopScenes, RodAtTheSpeedOfTheSourceEndsNearItsPublishedDeflection) {
+  Scene scene = slider_crank(150);
+  scene.duration = 0.1, scene.output_step = 5e-4;
+  const RunResult r = run_scene(scene, {});
+  const VectorXd found = found_deflection(r).half_sine;
+  const double published = 1.893192460247178e-4, way = 1.697373326718410e-1;
+  const Index last = found.size() - 1;
+  std::printf("published: %.4e m, found %.4e m of %.3e m; piston %.3e m\n", published, found[last],
+              found.cwiseAbs().maxCoeff(), column(r, "guide.length")[last] - way);
+  EXPECT_NEAR(found[last], published, 0.02 * found.cwiseAbs().maxCoeff());
+  EXPECT_NEAR(column(r, "guide.length")[last], way, 2e-5);  // the source's rod is 8e-6 m shorter then
+}
+
+}  // namespace
+}  // namespace flexboom
