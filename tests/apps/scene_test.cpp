@@ -319,7 +319,8 @@ TEST(Scene, FixedHubNeedsNoMass) {
 }
 
 TEST(Scene, MarkerOfEncodingAndWindowsLineEndsAreAccepted) {
-  std::string text = "\xEF\xBB\xBF" + std::string(full_scene);
+  std::string text = "\xEF\xBB\xBF";
+  text += full_scene;
   for (size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += 2) text.insert(at, "\r");
   EXPECT_EQ(parse_scene(text, "scene.toml").bodies.size(), 1u);
 }
