@@ -30,7 +30,10 @@ Scene sport(int modes, double duration) {
 std::vector<Case> cases(const std::vector<std::string>& scenes) {
   if (!scenes.empty()) {
     std::vector<Case> list;
-    for (const std::string& name : scenes) list.push_back({name, load_scene(name), "bdf"});
+    for (const std::string& name : scenes) {
+      list.push_back({name, load_scene(name), "bdf"});
+      for (BodyScene& b : list.back().scene.bodies) b.stiffening = "off";  // multipliers have none
+    }
     return list;
   }
   std::vector<Case> list{{"sport", sport(2, 10), "bdf"},
@@ -43,72 +46,80 @@ std::vector<Case> cases(const std::vector<std::string>& scenes) {
   return list;
 }
 
+constexpr const char* by_multipliers = "ida";
+
+/// Those that fly the scene: of relative coordinates, then that of multipliers.
+std::vector<std::string> methods_of(const Scene& scene) {
+  for (const JointScene& j : scene.joints)
+    require(!j.closes_loop,
+            fmt::format("scene {} closes a loop: one method flies it, there is nothing to compare", scene.name));
+  std::vector<std::string> names;
+  for (const IntegratorMethod& m : integrator_methods())
+    if (!scene.is_tree || m.name != IntegratorOptions{}.method) names.emplace_back(m.name);
+  names.emplace_back(by_multipliers);
+  return names;
+}
+
 class Bench {
  public:
   Bench(double longest, const std::function<void(const TransientBench&)>& seen) : longest_(longest), seen_(seen) {}
 
   std::vector<TransientBench> run(const std::vector<std::string>& scenes) {
     for (const Case& c : cases(scenes)) {
-      std::vector<PreparedBody> bodies;
-      for (const BodyScene& b : c.scene.bodies) bodies.push_back(prepare_body(b));
-      require(c.scene.formulation == "relative",
-              fmt::format("scene {}: formulation is \"{}\", but this compares the methods of \"relative\"", c.name,
-                          c.scene.formulation));
-      const Flyable flyable = make_system(c.scene, bodies);
       references_.clear();
-      for (const IntegratorMethod& method : integrator_methods()) ladder(c, flyable, std::string(method.name));
+      for (const std::string& method : methods_of(c.scene)) ladder(c, method);
     }
     return std::move(rows_);
   }
 
  private:
-  void ladder(const Case& c, const Flyable& f, const std::string& method) {
+  void ladder(const Case& c, const std::string& method) {
     for (int digits = 2; digits <= 9; ++digits) {
-      TransientBench row = measured(c, f, method, std::pow(10.0, -digits));
+      TransientBench row = measured(c, method, std::pow(10.0, -digits));
       rows_.push_back(row);
       seen_(row);
       if (2 * row.seconds > longest_ || !row.failure.empty()) return;
     }
   }
 
-  static Trajectory fly(const Case& c, const Flyable& f, const std::string& method, double tolerance) {
-    IntegratorOptions o;
-    o.method = method;
-    o.tolerance = tolerance;
-    o.duration = c.scene.duration;
-    o.output_step = c.scene.output_step;
-    return integrate(f.system, f.y0, o);
+  static Run fly(const Case& c, const std::string& method, double tolerance) {
+    Scene scene = c.scene;
+    scene.integrator = method;
+    scene.formulation = method == by_multipliers ? "multipliers" : "relative";
+    scene.tolerance = tolerance;
+    return run_once(scene, {});
   }
 
-  const OutputTable& reference(const Case& c, const Flyable& f, const std::string& judged) {
-    const std::string method = judged == c.reference ? "exponential" : c.reference;
+  const OutputTable& reference(const Case& c, const std::string& judged) {
+    const std::string other = c.scene.is_tree ? "adams" : IntegratorOptions{}.method;
+    const std::string method = judged == c.reference ? other : c.reference;
     const auto [place, is_new] = references_.try_emplace(method);
-    if (is_new) place->second = output_table(c.scene, f.system, fly(c, f, method, 1e-11));
+    if (is_new) place->second = fly(c, method, 1e-11).outputs;
     return place->second;
   }
 
-  TransientBench measured(const Case& c, const Flyable& f, const std::string& method, double tolerance) {
+  TransientBench measured(const Case& c, const std::string& method, double tolerance) {
     TransientBench row;
     row.scene = c.name;
     row.method = method;
     row.tolerance = tolerance;
     row.simulated = c.scene.duration;
     try {
-      const OutputTable& exact = reference(c, f, method);
+      const OutputTable& exact = reference(c, method);
       row.seconds = std::numeric_limits<double>::infinity();
       const Stopwatch all;
-      Trajectory r;
+      Run r;
       for (int run = 0; run < 5 && (run == 0 || all.seconds() < 0.5); ++run) {
-        r = fly(c, f, method, tolerance);
-        row.seconds = std::min(row.seconds, r.summary.seconds);
+        r = fly(c, method, tolerance);
+        row.seconds = std::min(row.seconds, r.motion.summary.seconds);
       }
-      const OutputTable table = output_table(c.scene, f.system, r);
-      row.error = largest(compare_outputs(table, exact, {}));
-      row.hub_error = largest(compare_outputs(table, exact, {"hub.rotation"}));
-      row.energy = r.summary.energy_balance;
-      row.steps = r.summary.steps;
-      row.evaluations = r.summary.rhs_evaluations;
-      row.events = static_cast<long>(r.events.size());
+      row.error = largest(compare_outputs(r.outputs, exact, {}));
+      row.hub_error = c.scene.is_tree ? std::numeric_limits<double>::quiet_NaN()
+                                      : largest(compare_outputs(r.outputs, exact, {"hub.rotation"}));
+      row.energy = r.motion.summary.energy_balance;
+      row.steps = r.motion.summary.steps;
+      row.evaluations = r.motion.summary.rhs_evaluations;
+      row.events = static_cast<long>(r.motion.events.size());
     } catch (const NumericalError& e) {
       row.seconds = 0;
       row.failure = e.what();

@@ -551,10 +551,10 @@ class TreeScenes(Case):
             result = flexboom("run", "tumbling", *arguments)
             self.assert_exit(INPUT, result)
             self.assertIn(words, result.stderr)
-        for command in (("compare", "two-link-arm"), ("bench", "transient", "tumbling")):
+        for command, words in ((("compare", "two-link-arm"), "joints"), (("bench", "transient", "slider-crank"), "loop")):
             result = flexboom(*command)
             self.assertEqual(result.returncode, INPUT, result.stderr)
-            self.assertIn("joints", result.stderr)
+            self.assertIn(words, result.stderr)
 
 
 class Interrupted(Case):
@@ -782,12 +782,20 @@ class Bench(Case):
         result = flexboom("bench", "transient", scene, "--longest", "0.001", "--json", "--out", out)
         self.assert_exit(OK, result)
         rows = json.loads(result.stdout)
-        self.assertEqual({row["method"] for row in rows}, {"exponential", "bdf", "adams"})
+        self.assertEqual({row["method"] for row in rows}, {"exponential", "bdf", "adams", "ida"})
         for row in rows:
             self.assertLess(row["error"], 0.2, row)  # of a coarse tolerance, just after a contact
             self.assertLess(row["hub_error"], 0.01, row)
         self.assertIn("exponential", (out / "bench_transient.csv").read_text())
         self.assertIn("<svg", (out / "bench_transient.svg").read_text())
+
+    def test_transient_of_a_scene_with_joints(self):
+        result = flexboom("bench", "transient", "two-link-arm", "--longest", "0.001", "--json", "--out", self.folder)
+        self.assert_exit(OK, result)
+        rows = json.loads(result.stdout)
+        self.assertEqual({row["method"] for row in rows}, {"bdf", "adams", "ida"})
+        for row in rows:
+            self.assertLess(row["error"], 0.2, row)
 
     def test_unknown_bench(self):
         self.assert_exit(USAGE, flexboom("bench", "nonsense"))

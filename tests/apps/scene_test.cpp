@@ -320,8 +320,10 @@ TEST(Scene, FixedHubNeedsNoMass) {
 
 TEST(Scene, MarkerOfEncodingAndWindowsLineEndsAreAccepted) {
   std::string text = "\xEF\xBB\xBF";
-  text += full_scene;
-  for (size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += 2) text.insert(at, "\r");
+  for (const char c : std::string_view(full_scene)) {
+    if (c == '\n') text += '\r';
+    text += c;
+  }
   EXPECT_EQ(parse_scene(text, "scene.toml").bodies.size(), 1u);
 }
 
