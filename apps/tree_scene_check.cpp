@@ -251,6 +251,8 @@ class TreeCheck {
       faults_.add("turns[0].body",
                   fmt::format("{} can not turn: it needs a joint of kind \"free\" to the inertial frame",
                               toml_reader::quoted(body)));
+    if (std::ranges::any_of(scene_.joints, [](const JointScene& j) { return j.closes_loop; }))
+      faults_.add("turns", "need a tree: with closed loops give the wheels their torques");
     if (!rest) faults_.add("turns", "start from rest: joints and wheels must have no rates at t = 0");
   }
 

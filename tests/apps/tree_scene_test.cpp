@@ -183,6 +183,33 @@ TEST(TreeScene, TakesBodiesReducedBefore) {
   std::filesystem::remove(file);
 }
 
+TEST(TreeScene, TurnsAreReadCheckedAndWrittenBack) {
+  const std::string good = builtin_scene("sport-calibration");
+  EXPECT_EQ(fault_of(good), "");
+  const std::string written = to_toml(parse_scene(good, "scene.toml"));
+  EXPECT_EQ(to_toml(parse_scene(written, "scene.toml")), written);
+  EXPECT_EQ(parse_scene(written, "scene.toml").turns.size(), 6u);
+  const struct {
+    const char *old, *replacement, *words;
+  } cases[] = {
+      {"profile = \"trapezoid\"", "profile = \"trapezium\"", "turns[0]: manoeuvre: profile 'trapezium' is not known"},
+      {"peak_rate = 0.1", "peak_rate = 0.0", "turns[0]: manoeuvre: peak rate"},
+      {"pause = 10.0", "pause = -10.0", "turns[0].pause: is -10 s"},
+      {"pause = 10.0", "paus = 10.0", "turns[0].paus: unknown key; did you mean \"pause\"?"},
+      {"kind = \"free\"", "kind = \"spherical\"", "turns[0].body: \"sport\" can not turn"},
+      {"inertia = 2e-5", "inertia = 2e-5\ntorque = 0", "has 2 wheels without a torque of their own"},
+      {"inertia = 2e-5", "inertia = 2e-5\nspin = 1", "turns: start from rest"},
+      {"[[turns]]\nbody = \"sport\"", "[[turns]]\nbody = \"sprt\"", "turns[0].body: is \"sprt\"; did you mean"},
+  };
+  for (const auto& c : cases) {
+    std::string bad = good;
+    const size_t at = bad.find(c.old);
+    ASSERT_NE(at, std::string::npos) << c.old;
+    bad.replace(at, std::string(c.old).size(), c.replacement);
+    EXPECT_NE(fault_of(bad).find(c.words), std::string::npos) << c.replacement << "\n" << fault_of(bad);
+  }
+}
+
 TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
   const std::string good = full_tree;
   EXPECT_EQ(fault_of(good), "");
