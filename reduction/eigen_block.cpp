@@ -112,7 +112,7 @@ class BlockLanczos {
   Index start_afresh() {
     MatrixXd R = random_block(p_.K.rows(), start_width_, 20201116 + static_cast<std::uint64_t>(starts_));
     const Index given = std::min(start_width_, p_.start.cols());
-    if (starts_ == 0) R.leftCols(given) = random_part * R.leftCols(given) + p_.start.leftCols(given);
+    if (starts_ == 0 && given > 0) R.leftCols(given) = random_part * R.leftCols(given) + p_.start.leftCols(given);
     const Index before = basis_.size();
     basis_.append(solve(symmetric_product(p_.M, R)), negligible);
     const Index added = basis_.size() - before;
