@@ -1,7 +1,6 @@
 // Scenes by multipliers: closed loops, what is refused, and the same results as in relative coordinates.
 
-#include "apps/simulate.hpp"
-#include "fem/check.hpp"
+#include "tests/apps/run_testing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -68,12 +67,6 @@ std::string with(std::string text, const std::string& old, const std::string& re
 }
 
 RunResult run(const std::string& text) { return run_scene(parse_scene(text, "scene.toml"), {}); }
-
-VectorXd column(const RunResult& r, const std::string& name) {
-  const auto i = std::find(r.outputs.names.begin(), r.outputs.names.end(), name);
-  require(i != r.outputs.names.end(), "no column " + name);
-  return r.outputs.values.col(i - r.outputs.names.begin());
-}
 
 /// The error of a kind that the program tells by its exit code.
 template <class Error>

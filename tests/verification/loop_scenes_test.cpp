@@ -1,7 +1,6 @@
 // The built-in scene with a closed loop, and SPORT, by multipliers: each against what is known of it.
 
-#include "apps/simulate.hpp"
-#include "fem/check.hpp"
+#include "tests/apps/run_testing.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -18,18 +17,6 @@ using Eigen::Vector2d;
 using Eigen::VectorXd;
 
 constexpr double pi = std::numbers::pi;
-
-Scene scene_named(const std::string& name) {
-  Scene scene = load_scene(name);
-  scene.error_budget = false;
-  return scene;
-}
-
-VectorXd column(const RunResult& r, const std::string& name) {
-  const auto i = std::find(r.outputs.names.begin(), r.outputs.names.end(), name);
-  require(i != r.outputs.names.end(), "no column " + name);
-  return r.outputs.values.col(i - r.outputs.names.begin());
-}
 
 // ---- SPORT in both formulations ----
 

@@ -1,0 +1,106 @@
+// SPORT turned by its reaction wheels: what the booms do to the pointing of the hub.
+
+#include "dynamics/time_function.hpp"
+#include "tests/apps/run_testing.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double pi = std::numbers::pi;
+
+/// Largest pointing error [rad].
+double worst_pointing(const RunResult& r) {
+  double worst = 0;
+  for (Index i = 0; i < r.outputs.values.rows(); ++i) worst = std::max(worst, vector_at(r, "sport.pointing", i).norm());
+  return worst;
+}
+
+/// A quarter turn about x, from t = 1 s on; rigid: booms that neither bend nor swing.
+Scene quarter_turn(const std::string& profile, bool rigid) {
+  Scene scene = scene_named("sport-calibration");
+  scene.turns.resize(1);
+  scene.turns[0].manoeuvre = {profile, pi / 2, 0.1, 0.02, 0};
+  scene.turns[0].pause = 1;
+  scene.duration = 45;
+  scene.output_step = 0.05;
+  for (JointScene& j : scene.joints)
+    if (rigid && j.kind == JointKind::hinge) j.kind = JointKind::fixed, j.mechanism = {.rest = 0, .threshold = 0};
+  for (BodyScene& b : scene.bodies)
+    if (rigid && !b.rigid) b.structure = "rigid";
+  return scene;
+}
+
+TEST(Calibration, RigidSportPointsAsCommanded) {
+  Scene scene = quarter_turn("trapezoid", true);
+  scene.tolerance = 1e-9;
+  const RunResult r = run_scene(scene, {});
+  EXPECT_LT(worst_pointing(r), 1e-7);
+  EXPECT_NEAR(vector_at(r, "sport.rotation", r.outputs.values.rows() - 1).norm(), pi / 2, 1e-7);
+}
+
+/// In a smooth turn SIP leans on its spring, or on its stop, by what its inertia asks: with s along the boom and the
+/// hinge at (y, z) from the mass centre, k gap = int s (s + |z|) dm alpha + int s |y| dm omega^2.
+TEST(Calibration, LeansTheBoomsOnTheirSprings) {
+  const Scene scene = quarter_turn("smooth", false);
+  const RunResult r = run_scene(scene, {});
+  double mass = 0;
+  Vector3d centre = Vector3d::Zero();
+  for (size_t i = 0; i < r.bodies.size(); ++i) {
+    const ReducedBody& b = r.bodies[i].body;
+    const PlaceScene& hinge = scene.joints[i].a;  // joint i carries body i
+    mass += b.m;
+    // Deployed: along stowed x turned by 90 degrees about z.
+    if (i > 0) centre += b.m * hinge.point + b.mc0.x() * hinge.z.cross(hinge.x);
+  }
+  centre /= mass;
+  const ReducedBody& sip = r.bodies[3].body;
+  const JointScene& hinge = scene.joints[3];
+  ASSERT_EQ(hinge.name, "sip");
+  const double y = std::abs(hinge.a.point.y() - centre.y()), z = std::abs(hinge.a.point.z() - centre.z());
+  const TimeFunction turn = rest_to_rest(turns_of(scene.turns)[0].manoeuvre).function;
+  const VectorXd t = column(r, "t"), angle = column(r, "sip.angle");
+  double largest = 0, worst = 0;
+  for (Index i = 0; i < t.size(); ++i) {
+    const double rate = turn.rate(t[i]),
+                 push = (sip.J0(2, 2) + z * sip.mc0.x()) * turn.acceleration(t[i]) + y * sip.mc0.x() * rate * rate;
+    const double gap = angle[i] - hinge.mechanism.rest;
+    const double k = hinge.mechanism.stiffness + (push > 0 ? hinge.mechanism.stop_stiffness : 0);
+    largest = std::max(largest, std::abs(gap));
+    worst = std::max(worst, std::abs(gap - push / k));
+  }
+  std::printf("calibration: SIP leans by %.3e rad, quasi-static within %.1e\n", largest, worst);
+  EXPECT_GT(largest, 1e-4);
+  EXPECT_LT(worst, 0.03 * largest);  // it lags by damping / stiffness = 0.06 s
+}
+
+TEST(Calibration, ShakesMoreByCornersThanSmoothly) {
+  const RunResult corners = run_scene(quarter_turn("trapezoid", false), {}),
+                  smooth = run_scene(quarter_turn("smooth", false), {});
+  std::printf("calibration: pointing error %.2e rad by a trapezoid, %.2e smoothly\n", worst_pointing(corners),
+              worst_pointing(smooth));
+  EXPECT_GT(worst_pointing(corners), 3 * worst_pointing(smooth));
+  EXPECT_LT(corners.trajectory.summary.momentum_drift, 1e-6);
+}
+
+/// Booms at rest on their stops are no reason for steps without end, whatever the tolerance.
+TEST(Calibration, TightToleranceDoesNotChatter) {
+  Scene scene = quarter_turn("smooth", false);
+  scene.turns[0].axis = Vector3d::UnitY();  // pushes no boom on its spring
+  scene.tolerance = 1e-10;
+  const RunResult r = run_scene(scene, {});
+  EXPECT_LT(r.trajectory.events.size(), 1000u);
+  EXPECT_LT(r.trajectory.summary.steps, 100'000);
+}
+
+}  // namespace
+}  // namespace flexboom
