@@ -2,6 +2,7 @@
 
 #include "dynamics/body_constants.hpp"
 #include "dynamics/hub_check.hpp"
+#include "dynamics/inner_loop.hpp"
 #include "dynamics/rotation.hpp"
 #include "dynamics/workspace.hpp"
 #include "fem/check.hpp"
@@ -12,14 +13,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-
-// The two inner loops are compiled twice, for any x86-64 and for one with AVX2 and FMA; the loader picks. Everything
-// they call is inlined, so that it is compiled twice too.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
-#define FLEXBOOM_INNER_LOOP __attribute__((target_clones("arch=haswell", "default"), flatten))
-#else
-#define FLEXBOOM_INNER_LOOP
-#endif
 
 namespace flexboom {
 

@@ -1,5 +1,6 @@
 #include "dynamics/tree.hpp"
 
+#include "dynamics/inner_loop.hpp"
 #include "dynamics/tree_impl.hpp"
 #include "fem/check.hpp"
 
@@ -9,13 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-
-// As in system.cpp: compiled for any x86-64 and for one with AVX2 and FMA.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
-#define FLEXBOOM_INNER_LOOP __attribute__((target_clones("arch=haswell", "default"), flatten))
-#else
-#define FLEXBOOM_INNER_LOOP
-#endif
 
 namespace flexboom {
 
