@@ -107,13 +107,20 @@ std::vector<int> slices_order(const QuotientGraph& graph, const Levels& levels) 
     const bool is_cut = level % slice_levels == slice_levels - 1 && touches_next;
     (is_cut ? cuts : inside).push_back(g);
   }
+  const auto slice_of = [&](int g) { return levels.level[at(g)] / slice_levels; };
+  // As the mesh numbers them, so that slices of a uniform mesh are the same graph.
+  std::sort(inside.begin(), inside.end(),
+            [&](int g, int h) { return std::pair(slice_of(g), g) < std::pair(slice_of(h), h); });
   const QuotientGraph insides = subgraph(graph, inside);
-  const auto slice_of = [&](int k) { return levels.level[at(inside[at(k)])] / slice_levels; };
-  std::vector<int> order;
+  std::vector<int> order, slice;
+  QuotientGraph seen;  // that of `slice`
   for (int first = 0, last = 0; first < insides.size(); first = last) {
-    while (last < insides.size() && slice_of(last) == slice_of(first)) ++last;
-    const std::vector<int> slice = dissection(range_of(insides, first, last));
-    if (slice.empty()) return {};
+    while (last < insides.size() && slice_of(inside[at(last)]) == slice_of(inside[at(first)])) ++last;
+    if (QuotientGraph part = range_of(insides, first, last); part != seen) {
+      slice = dissection(part);
+      if (slice.empty()) return {};
+      seen = std::move(part);
+    }
     for (const int k : slice) order.push_back(inside[at(first + k)]);
   }
   order.insert(order.end(), cuts.begin(), cuts.end());

@@ -16,6 +16,7 @@ struct QuotientGraph {
 
   int size() const { return static_cast<int>(weight.size()); }
   int degree(int g) const { return start[static_cast<size_t>(g) + 1] - start[static_cast<size_t>(g)]; }
+  bool operator==(const QuotientGraph&) const = default;
 };
 
 QuotientGraph quotient_graph(const SparseMatrix& lower_pattern);
