@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 namespace flexboom::elasticity {
 namespace {
@@ -36,13 +35,11 @@ FLEXBOOM_FOR_EACH_PROCESSOR void scale_strains(const double* slopes, Index count
 }
 
 constexpr int points_at_once = 16;  // their strains of eight pairs stay in the first cache
-constexpr int loads_at_once = 6;    // their sums stay in registers
+constexpr int loads_at_once = 6;    // their sums stay in registers, twice as many too, which hides latencies
 
 template <class Lanes>
 [[gnu::always_inline]] inline Lanes lanes_at(const double* from) {
-  Lanes result;
-  std::memcpy(&result, from, sizeof result);
-  return result;
+  return {*reinterpret_cast<const typename Lanes::Anywhere*>(from)};
 }
 
 /// Points with the slopes of shapes, `stride` long with zeros at the end, and stresses: 6 rows of `loads` per point.
@@ -67,6 +64,7 @@ template <class Lanes>
 [[gnu::always_inline]] inline void set_second_order(const double* slopes, int stride, int k, int l, Lanes* strains) {
   double of_k[9];
   Lanes of_l[9];
+#pragma GCC unroll 9
   for (int i = 0; i < 9; ++i) {
     of_k[i] = slopes[i * stride + k];
     of_l[i] = lanes_at<Lanes>(slopes + i * stride + l);
@@ -82,6 +80,26 @@ template <class Lanes>
   strains[5].of = work(2, 0) + work(0, 2);
 }
 
+/// Adds the strains of some pairs times the stresses of the loads first .. first + count - 1.
+template <int count, class Lanes>
+[[gnu::always_inline]] inline void add_loads(const PointBlock& block, const Lanes* strains, int first, int lanes,
+                                             const PackedWork& work, double* to) {
+  Lanes sums[count] = {};
+  for (int s = 0; s < 6 * block.points; ++s) {
+    const double* const stress = block.stresses + s * block.loads + first;
+#pragma GCC unroll 12
+    for (int c = 0; c < count; ++c) sums[c].of += strains[s].of * stress[c];
+  }
+  for (int c = 0; c < std::min(count, work.loads - first); ++c) {
+    double* const at = to + (first + c) * work.stride;
+    if (lanes == Lanes::width) {
+      *reinterpret_cast<typename Lanes::Anywhere*>(at) += sums[c].of;
+    } else {
+      for (int lane = 0; lane < lanes; ++lane) at[lane] += sums[c].of[lane];
+    }
+  }
+}
+
 template <class Lanes>
 [[gnu::always_inline]] inline void add_work_by(const PointBlock& block, const PackedWork& work) {
   Lanes strains[6 * points_at_once];
@@ -91,23 +109,10 @@ template <class Lanes>
       for (int p = 0; p < block.points; ++p)
         set_second_order(block.slopes + 9 * p * block.stride, block.stride, k, l, strains + 6 * p);
       const int lanes = std::min(Lanes::width, work.shapes - l);
-      for (int first = 0; first < block.loads; first += loads_at_once) {
-        Lanes sums[loads_at_once] = {};
-        for (int s = 0; s < 6 * block.points; ++s) {
-          const double* const stress = block.stresses + s * block.loads + first;
-#pragma GCC unroll 6
-          for (int c = 0; c < loads_at_once; ++c) sums[c].of += strains[s].of * stress[c];
-        }
-        for (int c = 0; c < std::min(loads_at_once, work.loads - first); ++c) {
-          double* const to = row + (l - k) + (first + c) * work.stride;
-          if (lanes == Lanes::width) {
-            sums[c].of += lanes_at<Lanes>(to).of;
-            std::memcpy(to, &sums[c], sizeof sums[c]);
-          } else {
-            for (int lane = 0; lane < lanes; ++lane) to[lane] += sums[c].of[lane];
-          }
-        }
-      }
+      int first = 0;
+      for (; first + 2 * loads_at_once <= block.loads; first += 2 * loads_at_once)
+        add_loads<2 * loads_at_once>(block, strains, first, lanes, work, row + (l - k));
+      if (first < block.loads) add_loads<loads_at_once>(block, strains, first, lanes, work, row + (l - k));
     }
   }
 }

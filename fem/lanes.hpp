@@ -13,17 +13,21 @@
 
 namespace flexboom {
 
-// A row of a few columns side by side: a vector register, or as many as the processor needs for it.
+// A row of a few columns side by side: a vector register, or as many as the processor needs for it. `Anywhere` is one
+// in memory that need not be aligned: a copy by memcpy goes through the stack in halves.
 struct alignas(64) Eight {
   static constexpr int width = 8;
+  using Anywhere [[gnu::vector_size(64), gnu::aligned(8), gnu::may_alias]] = double;
   double of [[gnu::vector_size(64)]];
 };
 struct alignas(32) Four {
   static constexpr int width = 4;
+  using Anywhere [[gnu::vector_size(32), gnu::aligned(8), gnu::may_alias]] = double;
   double of [[gnu::vector_size(32)]];
 };
 struct alignas(16) Two {
   static constexpr int width = 2;
+  using Anywhere [[gnu::vector_size(16), gnu::aligned(8), gnu::may_alias]] = double;
   double of [[gnu::vector_size(16)]];
 };
 
