@@ -92,16 +92,21 @@ double stiffness_scale(const EigenProblem& p) {
   return scale > 0 ? scale : 1;
 }
 
+double energy_round_off(const EigenProblem& p, double sigma, const Eigen::Ref<const VectorXd>& phi) {
+  const double of_mass = sigma == 0 ? 0 : std::abs(sigma) * absolute_form(p.M, phi);
+  return eps * (absolute_form(p.K, phi) + of_mass);
+}
+
 int zero_modes(const EigenProblem& p, const EigenPairs& pairs) {
   double largest = 0;  // of the energies counted as zero, and the round-off in them
   int zero = 0;        // modes below the last gap of 100
   for (int i = 0; i < pairs.lambda.size(); ++i) {
     const VectorXd phi = pairs.Phi.col(i);
     if (i > 0 && pairs.lambda(i) > 100 * largest) zero = i;
-    const double round_off = eps * absolute_form(p.K, phi);
+    const double round_off = energy_round_off(p, 0, phi);
     // phi may be coarse, then lambda is better than the energy; next to a large shift the energy is.
     const double energy = std::min(std::abs(pairs.lambda(i)), std::abs(quadratic_form(p.K, phi)(0, 0)));
-    if (energy > 32 * round_off) return zero;
+    if (energy > no_digit * round_off) return zero;
     largest = std::max({largest, energy, round_off});
   }
   return static_cast<int>(pairs.lambda.size());

@@ -48,8 +48,15 @@ constexpr int indefinite_unknowns = 2000;
 /// Scale of the highest eigenvalues [rad^2/s^2]: the largest Rayleigh quotient of a unit vector.
 double stiffness_scale(const EigenProblem&);
 
-/// How many of the lowest modes have a frequency that is zero to round-off: their strain energy is within 32 units in
-/// the last place of the sum |phi|^T |K| |phi| it comes from, and the next is 100 times larger.
+/// What round-off leaves in the energy phi^T (K - sigma M) phi: a unit in the last place of the sum of |phi|^T (|K| +
+/// |sigma| |M|) |phi| that it comes from.
+double energy_round_off(const EigenProblem&, double sigma, const Eigen::Ref<const Eigen::VectorXd>& phi);
+
+/// An energy of fewer such units is zero.
+constexpr double no_digit = 32;
+
+/// How many of the lowest modes have a frequency that is zero to round-off: their strain energy has no digit, and the
+/// next is 100 times larger.
 int zero_modes(const EigenProblem&, const EigenPairs&);
 
 /// Shift for a body that can move freely: minus a tenth of the first elastic eigenvalue, so that the rigid modes are

@@ -63,6 +63,34 @@ TEST_P(LargeBackend, StiffnessContrastOfAMillion) {
   EXPECT_EQ(pairs.summary.rigid_modes, 0);
 }
 
+/// Bar elements graded to the clamp down to 1e-11 of the length: the highest eigenvalue is 1e22 of the lowest, which
+/// loses no digit by that.
+TEST_P(LargeBackend, GradingToTheClampIsNoSingularity) {
+  std::vector<double> x = {0};
+  for (int level = 15; level > 0; --level) x.push_back(std::pow(0.2, level));
+  constexpr int n = 2100;  // equal elements after that
+  for (int k = 0; k < n; ++k) x.push_back(0.2 + 0.8 * (k + 1) / n);
+  std::vector<Eigen::Triplet<double>> K, M;
+  const auto add = [](auto& entries, int i, int j, double value) {
+    if (i > 0 && j > 0) entries.emplace_back(i - 1, j - 1, value);  // node 0 is held
+  };
+  const auto nodes = static_cast<int>(x.size());
+  for (int e = 1; e < nodes; ++e) {
+    const double h = x[static_cast<size_t>(e)] - x[static_cast<size_t>(e) - 1];
+    add(K, e, e, 1 / h), add(K, e - 1, e - 1, 1 / h), add(K, e, e - 1, -1 / h);
+    add(M, e, e, h / 3), add(M, e - 1, e - 1, h / 3), add(M, e, e - 1, h / 6);
+  }
+  System s{SparseMatrix(nodes - 1, nodes - 1), SparseMatrix(nodes - 1, nodes - 1)};
+  s.K.setFromTriplets(K.begin(), K.end());
+  s.M.setFromTriplets(M.begin(), M.end());
+  const EigenPairs pairs = solve_modes(s.problem(), options(3, GetParam()));
+  EXPECT_EQ(pairs.summary.note, "");
+  EXPECT_EQ(pairs.summary.sigma, 0);
+  // Linear elements: the square of omega h / sqrt(12), with the element of length 0.16 for the most.
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR(std::sqrt(pairs.lambda(k)) / ((k + 0.5) * pi), 1, 3e-3 * (k + 1) * (k + 1)) << k;
+}
+
 TEST_P(LargeBackend, PartWithoutDensityAndConsistentMass) {
   // Bar elements, M = h/6 [2 1; 1 2]; the middle third has no density: infinite eigenvalues.
   const int n = 300;
