@@ -152,13 +152,15 @@ struct SparseFactor::Impl {
   void solve(const Eigen::Ref<const Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd> X) {
     if (!L->is_super) return solve_by_cholmod(B, X);
     for (Eigen::Index done = 0; done < B.cols();) {
-      const Eigen::Index columns = std::min<Eigen::Index>(16, B.cols() - done);
+      const Eigen::Index columns = std::min<Eigen::Index>(columns_at_once(), B.cols() - done);
       const auto b = B.middleCols(done, columns);
       auto x = X.middleCols(done, columns);
       if (columns == 1)
         solve_by_cholmod(b, x);
       else if (columns <= 8)
         solve_by_rows<8>(b, x);
+      else if (columns <= 12)
+        solve_by_rows<12>(b, x);
       else
         solve_by_rows<16>(b, x);
       done += columns;
@@ -168,7 +170,7 @@ struct SparseFactor::Impl {
   /// Up to `width` columns, filled up with zeros: the time is that of reading L, which CHOLMOD takes for one or two.
   template <int width>
   void solve_by_rows(const Eigen::Ref<const Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd> X) {
-    rows.resize(static_cast<size_t>(size) * (width / 8));
+    rows.resize((static_cast<size_t>(size) * width + 7) / 8);
     double* const x = reinterpret_cast<double*>(rows.data());
     for (Eigen::Index i = 0; i < size; ++i) {
       double* const row = x + width * static_cast<Eigen::Index>(place[static_cast<size_t>(i)]);
@@ -178,7 +180,7 @@ struct SparseFactor::Impl {
     const auto ints = [](const void* array) { return static_cast<const int*>(array); };
     const Supernodes blocks{static_cast<int>(L->nsuper),     ints(L->super), ints(L->pi), ints(L->px), ints(L->s),
                             static_cast<const double*>(L->x)};
-    width == 8 ? solve_by_rows_of_8(blocks, x) : solve_by_rows_of_16(blocks, x);
+    (width == 8 ? solve_by_rows_of_8 : width == 12 ? solve_by_rows_of_12 : solve_by_rows_of_16)(blocks, x);
     for (Eigen::Index i = 0; i < size; ++i) {
       const double* const row = x + width * static_cast<Eigen::Index>(place[static_cast<size_t>(i)]);
       for (Eigen::Index c = 0; c < B.cols(); ++c) X(i, c) = row[c];

@@ -120,17 +120,27 @@ FLEXBOOM_INLINE void solve(const Supernodes& L, double* x) {
 // have room for.
 #ifdef FLEXBOOM_PROCESSORS
 [[gnu::target("avx512f")]] void by_8(const Supernodes& L, double* x) { solve<Eight, 8, 8>(L, x); }
+[[gnu::target("avx512f")]] void by_12(const Supernodes& L, double* x) { solve<Four, 8, 12>(L, x); }
 [[gnu::target("avx512f")]] void by_16(const Supernodes& L, double* x) { solve<Eight, 8, 16>(L, x); }
 [[gnu::target("avx2,fma")]] void by_8(const Supernodes& L, double* x) { solve<Four, 4, 8>(L, x); }
+[[gnu::target("avx2,fma")]] void by_12(const Supernodes& L, double* x) { solve<Four, 4, 12>(L, x); }
 [[gnu::target("avx2,fma")]] void by_16(const Supernodes& L, double* x) { solve<Four, 2, 16>(L, x); }
+[[gnu::target("avx512f")]] int widest() { return 16; }
+[[gnu::target("avx2,fma")]] int widest() { return 12; }
 #endif
 FLEXBOOM_ANY_PROCESSOR void by_8(const Supernodes& L, double* x) { solve<Two, 2, 8>(L, x); }
+FLEXBOOM_ANY_PROCESSOR void by_12(const Supernodes& L, double* x) { solve<Two, 1, 12>(L, x); }
 FLEXBOOM_ANY_PROCESSOR void by_16(const Supernodes& L, double* x) { solve<Two, 1, 16>(L, x); }
+FLEXBOOM_ANY_PROCESSOR int widest() { return 12; }
 
 }  // namespace
 
 void solve_by_rows_of_8(const Supernodes& L, double* x) { by_8(L, x); }
 
+void solve_by_rows_of_12(const Supernodes& L, double* x) { by_12(L, x); }
+
 void solve_by_rows_of_16(const Supernodes& L, double* x) { by_16(L, x); }
+
+int columns_at_once() { return widest(); }
 
 }  // namespace flexboom

@@ -4,6 +4,7 @@
 #include "fem/dense.hpp"
 #include "fem/inertia.hpp"
 #include "fem/stopwatch.hpp"
+#include "fem/supernodal_solve.hpp"
 #include "reduction/eigen_basis.hpp"
 
 #include <fmt/format.h>
@@ -24,8 +25,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index slab = 16;   // columns that are solved for at a time
-constexpr Index probes = 6;  // random vectors that look for modes missed
+constexpr Index probes = 5;  // random vectors that look for modes missed
 
 double hertz(double lambda) { return std::sqrt(std::max(0.0, lambda)) / (2 * std::numbers::pi); }
 
@@ -104,7 +104,7 @@ VectorXd residuals(const EigenProblem& p, const SparseFactor& shifted, const Eig
   VectorXd result(pairs.lambda.size());
   for (Index first = 0; first < result.size() || (search && search->load().cols() > 0);) {
     const Index beside = search ? search->load().cols() : 0;
-    const Index width = std::min(slab - beside, result.size() - first);
+    const Index width = std::min(columns_at_once() - beside, result.size() - first);
     MatrixXd W(M_Phi.rows(), width + beside);
     W.leftCols(width) = M_Phi.middleCols(first, width);
     if (beside > 0) W.rightCols(beside) = search->load();

@@ -4,6 +4,8 @@
 
 #include "box_matrix.hpp"
 
+#include <utility>
+
 namespace flexboom::testing {
 namespace {
 
@@ -84,12 +86,14 @@ TEST(SupernodalSolve, AgreesWithADenseTriangle) {
   }
   const Supernodes blocks{2, column, row_start, value_start, row.data(), value.data()};
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  for (const Index width : {8, 16}) {
+  const std::pair<Index, void (*)(const Supernodes&, double*)> solvers[] = {
+      {8, solve_by_rows_of_8}, {12, solve_by_rows_of_12}, {16, solve_by_rows_of_16}};
+  for (const auto& [width, solve_by_rows] : solvers) {
     const Rows B = Rows::Random(n, width);
-    std::vector<Eight> memory(static_cast<size_t>(n * width / 8));
+    std::vector<Eight> memory(static_cast<size_t>(n * width + 7) / 8);
     Eigen::Map<Rows> x(reinterpret_cast<double*>(memory.data()), n, width);
     x = B;
-    width == 8 ? solve_by_rows_of_8(blocks, x.data()) : solve_by_rows_of_16(blocks, x.data());
+    solve_by_rows(blocks, x.data());
     const MatrixXd expected = (L * L.transpose()).llt().solve(MatrixXd(B));
     EXPECT_LT(difference(x, expected), 1e-13) << width << " columns";  // condition below 100
   }
