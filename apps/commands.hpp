@@ -38,6 +38,7 @@ struct RunArguments {
   std::string scene;
   std::optional<double> duration, tolerance, output_step, vtu_step;
   std::optional<std::string> modes, structure, formulation, integrator;
+  std::filesystem::path from;  // results folder or state file that the run goes on from
   bool report = false;
   bool no_budget = false;
 };

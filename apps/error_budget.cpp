@@ -109,8 +109,14 @@ ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, 
   ErrorBudget budget;
   Scene flown = scene;
   budget.time = settle_time_error(scene, flown, run, hooks, plan);
-  if (any_elastic(scene, nullptr) && !asked_to_stop(hooks))
-    budget.truncation = truncation_error(run, flown, hooks, plan);
+  if (any_elastic(scene, nullptr) && !asked_to_stop(hooks)) {
+    if (scene.from) {
+      budget.truncation = std::numeric_limits<double>::quiet_NaN();
+      plan.emplace_back("error budget: truncation not measured: a saved state knows nothing of modes beyond its own");
+    } else {
+      budget.truncation = truncation_error(run, flown, hooks, plan);
+    }
+  }
   if (any_elastic(scene, "beam") && !asked_to_stop(hooks))
     budget.discretisation = change(run, flown, 2, "discretisation", hooks, plan);
   budget.linearisation = scene.is_tree ? run.stiffening_left_out : linearisation_estimate(run);

@@ -24,12 +24,12 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// Angles where the hinges start: a turn more is another stretch of their springs.
-std::vector<double> start_angles(const Multibody& scene, const TreeState& start) {
+/// Angles where the hinges start: a turn more is another stretch of their springs. `saved`: knows those of loops.
+std::vector<double> start_angles(const Multibody& scene, const TreeState& start, const SavedState* saved) {
   std::vector<double> angles;
   auto of_tree = start.joints.begin();
   for (const Joint& j : scene.joints) {
-    angles.push_back(j.mechanism.rest);
+    angles.push_back(saved ? saved->loop_angle(j.name, j.mechanism.rest) : j.mechanism.rest);
     if (j.closes_loop) continue;
     if (!of_tree->coordinate.empty()) angles.back() = of_tree->coordinate[0];
     ++of_tree;
@@ -38,13 +38,8 @@ std::vector<double> start_angles(const Multibody& scene, const TreeState& start)
 }
 
 MultipliersOptions multipliers_options(const IntegratorOptions& o, std::vector<double> angles) {
-  MultipliersOptions r;
-  r.tolerance = o.tolerance, r.duration = o.duration, r.output_step = o.output_step;
-  r.settle = o.settle;
+  MultipliersOptions r{o};
   r.angles = std::move(angles);
-  r.corners = o.corners, r.step_to_outputs = o.step_to_outputs;
-  r.max_steps = o.max_steps;
-  r.interrupt = o.interrupt, r.progress = o.progress;
   return r;
 }
 
@@ -57,9 +52,15 @@ IntegrationSummary summary_of(const MultipliersSummary& s) {
   r.seconds = s.seconds;
   r.energy_balance = s.energy_balance, r.momentum_drift = s.momentum_drift;
   r.constraint_drift = std::max({s.position_drift, s.angle_drift, s.quaternion_drift});
-  r.settled = s.settled;
+  r.stops = s.stops;
   r.interrupted = s.interrupted;
   return r;
+}
+
+void set_energies(MultipliersOptions& o, const TreeLayout& l, const VectorXd& y0) {
+  o.dissipated = y0[l.dissipated_elsewhere];
+  for (const TreeLayout::Joint& j : l.joints) o.dissipated += y0[j.dissipated];
+  o.work = y0[l.work];
 }
 
 /// Joints number from `first`.
@@ -159,24 +160,34 @@ void note_moved_starts(const Scene& scene, const TreeState& asked, const TreeSta
 
 Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
   const Stopwatch start;
-  const Multipliers system(make_multibody(scene, bodies));
+  Multibody all = make_multibody(scene, bodies);
   const Scene open = without_loops(scene);
   Run r;
   r.tree = std::make_shared<const Tree>(make_multibody(open, bodies));
   r.bodies = std::move(bodies);
-  VectorXd y0 = r.tree->pack(start_state(open, *r.tree));
-  r.tree->impose(0, y0);
-  const TreeState asked = r.tree->unpack(y0);
-  const std::vector<BodyState> closed = close_joints(system, body_states(*r.tree, 0, y0));
+  VectorXd y0 = first_state(open, *r.tree);
   IntegratorOptions options = integrator_options(scene, hooks, "ida", max_steps);
+  r.tree->impose(options.start, y0);
+  const TreeState asked = r.tree->unpack(y0);
+  for (size_t i = 0; i < all.wheels.size(); ++i) all.wheels[i].spin = asked.spin[i];
+  const Multipliers system(std::move(all));
+  const std::vector<BodyState> closed = close_joints(system, body_states(*r.tree, options.start, y0), options.start);
   set_corners(scene, options);
+  if (scene.from) options.stops = scene.from->stops(joint_names(scene));
+  MultipliersOptions of_flight =
+      multipliers_options(options, start_angles(system.multibody(), asked, scene.from.get()));
+  set_energies(of_flight, r.tree->layout(), y0);
   r.prepare_seconds = start.seconds();
 
   const Stopwatch flight_time;
-  MultibodyTrajectory flight =
-      integrate_multipliers(system, closed, multipliers_options(options, start_angles(system.multibody(), asked)));
+  MultibodyTrajectory flight = integrate_multipliers(system, closed, of_flight);
   const std::vector<TreeState> states = states_of(system, flight);
-  for (const TreeState& s : states) r.motion.y.push_back(r.tree->pack(without_loops(scene, s)));
+  for (size_t row = 0; row < states.size(); ++row) {
+    VectorXd y = r.tree->pack(without_loops(scene, states[row]));
+    y[r.tree->layout().dissipated_elsewhere] = flight.states[row].dissipated;
+    y[r.tree->layout().work] = flight.states[row].work;
+    r.motion.y.push_back(std::move(y));
+  }
   r.outputs = tree_output_table(scene, *r.tree, flight.time.size(), [&](size_t row) {
     return TreeMoment{flight.time[row], states[row], joint_loads(system, flight.states[row]),
                       balance_of(*r.tree, flight, row, r.motion.y[row])};
@@ -189,28 +200,36 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
   r.motion.events = events_of(flight.events, 0);
   r.motion.summary = summary_of(flight.summary);
   r.integrate_seconds = flight_time.seconds();
+  set_end(r, scene);
+  for (size_t i = 0; i < scene.joints.size(); ++i)
+    if (scene.joints[i].closes_loop && scene.joints[i].kind == JointKind::hinge)
+      r.end.loops[scene.joints[i].name] = states.back().joints[i].coordinate[0];
   return r;
 }
 
-Trajectory integrate_by_multipliers(const Flyable& f, const IntegratorOptions& options) {
-  const Multipliers system(multibody_of(f.system));
-  const Tree tree(multibody_of(f.system));
-  const Index motion = f.system.layout().dissipated();  // up to here both have the same states
+Trajectory integrate_by_multipliers(const System& of_hub, const VectorXd& start, const IntegratorOptions& options) {
+  const Multipliers system(multibody_of(of_hub));
+  const Tree tree(multibody_of(of_hub));
+  const Index motion = of_hub.layout().dissipated();  // up to here both have the same states
+  const int first = of_hub.fixed_hub() ? 0 : 1;       // joint that is a hinge
   VectorXd y0 = VectorXd::Zero(tree.layout().size);
-  y0.head(motion) = f.y0.head(motion);
-  MultibodyTrajectory flight =
-      integrate_multipliers(system, body_states(tree, 0, y0),
-                            multipliers_options(options, start_angles(system.multibody(), tree.unpack(y0))));
+  y0.head(motion) = start.head(motion);
+  MultipliersOptions of_flight =
+      multipliers_options(options, start_angles(system.multibody(), tree.unpack(y0), nullptr));
+  of_flight.dissipated = start[motion];
+  if (!options.stops.empty()) of_flight.stops.insert(of_flight.stops.begin(), static_cast<size_t>(first), {});
+  MultibodyTrajectory flight = integrate_multipliers(system, body_states(tree, options.start, y0), of_flight);
   Trajectory r;
   for (const MultibodyState& s : flight.states) {
-    VectorXd y(f.system.layout().size);
+    VectorXd y(of_hub.layout().size);
     y << tree.pack(tree_state(system, s)).head(motion), s.dissipated;
     r.y.push_back(std::move(y));
   }
   r.time = std::move(flight.time);
   r.balance = std::move(flight.balance);
-  r.events = events_of(flight.events, f.system.fixed_hub() ? 0 : 1);
+  r.events = events_of(flight.events, first);
   r.summary = summary_of(flight.summary);
+  r.summary.stops.erase(r.summary.stops.begin(), r.summary.stops.begin() + first);
   return r;
 }
 

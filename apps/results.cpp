@@ -124,9 +124,10 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   j["factorisations"] = s.factorisations;
   j["events"] = r.trajectory.events.size();
   j["restarts"] = s.restarts;
-  j["real_time_factor"] = r.trajectory.time.back() / std::max(r.integrate_seconds, 1e-9);
+  const double simulated = r.trajectory.time.back() - r.trajectory.time.front();
+  j["real_time_factor"] = simulated / std::max(r.integrate_seconds, 1e-9);
   j["interrupted"] = s.interrupted;
-  j["simulated_seconds"] = r.trajectory.time.back();
+  j["simulated_seconds"] = simulated;
   j["integrator"] = s.method;
   j["tolerance"] = r.scene.tolerance;
   j["energy_balance"] = s.energy_balance;
@@ -221,13 +222,14 @@ void write_motion(const RunResult& r, const fs::path& folder) {
 ordered_json write_results(const RunResult& r, const fs::path& folder) {
   const Stopwatch start;
   for (const char* old :
-       {"summary.json", "trajectory.csv", "events.csv", "motion.pvd", "report.html", "overview.svg"}) {
+       {"summary.json", "trajectory.csv", "events.csv", "state.toml", "motion.pvd", "report.html", "overview.svg"}) {
     std::error_code ignored;
     fs::remove(folder / old, ignored);
   }
   write_file(folder / "scene.toml", to_toml(r.scene));
   write_file(folder / "trajectory.csv", [&r](std::ostream& out) { print_trajectory_csv(out, r.outputs); });
   write_file(folder / "events.csv", events_csv(hinge_names(r), r.trajectory));
+  write_file(folder / "state.toml", to_toml(r.end, r.scene.name));
   if (r.scene.vtu_step > 0) r.scene.is_tree ? write_tree_motion(r, folder) : write_motion(r, folder);
   const double seconds = start.seconds();
   ordered_json summary = summary_json(r, seconds);

@@ -92,6 +92,27 @@ void override_modes(Scene& scene, const std::string& text) {
   }
 }
 
+/// The scene begins with a saved state, whose numbers of modes replace a choice by the program.
+void go_on(Scene& scene, const std::filesystem::path& from) {
+  auto saved = std::make_shared<const SavedState>(SavedState::read(from));
+  require(saved->time() < scene.duration,
+          fmt::format("--continue: {} is of t = {:g} s, the run ends at {:g} s; --duration is the time at the end",
+                      saved->file().string(), saved->time(), scene.duration));
+  for (BodyScene& b : scene.bodies) {
+    const auto modes = saved->modes().find(b.name);
+    if (!std::exchange(b.modes_auto, false) || modes == saved->modes().end()) continue;
+    b.modes = modes->second;
+  }
+  scene.from = std::move(saved);
+}
+
+/// A run that goes on from a folder does not write into it.
+void check_folder(const Scene& scene, const std::filesystem::path& folder) {
+  std::error_code error;
+  if (!scene.from || !std::filesystem::equivalent(scene.from->file().parent_path(), folder, error)) return;
+  throw InputError(fmt::format("--continue: {} would be overwritten; give another folder by --out", folder.string()));
+}
+
 Scene scene_of(const RunArguments& a) {
   Scene scene = load_scene(a.scene);
   if (a.duration) scene.duration = *a.duration;
@@ -105,16 +126,17 @@ Scene scene_of(const RunArguments& a) {
     for (BodyScene& b : scene.bodies)
       if (b.is_boom()) b.structure = *a.structure;
   if (a.no_budget) scene.error_budget = false;
+  if (!a.from.empty()) go_on(scene, a.from);
   validate(scene);
   return scene;
 }
 
 void print_summary(const RunResult& r, const std::filesystem::path& folder) {
   const IntegrationSummary& s = r.trajectory.summary;
+  const double simulated = r.trajectory.time.back() - r.trajectory.time.front();
   for (const std::string& line : r.plan) fmt::print("{}\n", line);
-  fmt::print("\n{:g} s in {:.3f} s ({:.0f} times real time): {} steps, {} evaluations, {} events\n",
-             r.trajectory.time.back(), r.integrate_seconds,
-             r.trajectory.time.back() / std::max(r.integrate_seconds, 1e-9), s.steps, s.rhs_evaluations,
+  fmt::print("\n{:g} s in {:.3f} s ({:.0f} times real time): {} steps, {} evaluations, {} events\n", simulated,
+             r.integrate_seconds, simulated / std::max(r.integrate_seconds, 1e-9), s.steps, s.rhs_evaluations,
              r.trajectory.events.size());
   fmt::print("energy balance {:.1e}, momentum drift {:.1e} (relative)\n", s.energy_balance, s.momentum_drift);
   if (r.budget.measured)
@@ -154,6 +176,7 @@ nlohmann::ordered_json checked(const std::string& name) {
 int run_command(const RunArguments& a, const CommonOptions& common) {
   const Scene scene = scene_of(a);
   const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results") / scene.name : common.out;
+  check_folder(scene, folder);
   prepare_folder(folder);
   const InterruptGuard guard;
   const RunResult result = run_with_progress(scene, !common.quiet && !common.json);

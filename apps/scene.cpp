@@ -8,10 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -23,12 +20,14 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using scene_keys::Dimension;
 using toml_reader::Faults;
+using toml_reader::parse_format;
+using toml_reader::read_format;
+using toml_reader::read_text;
 using toml_reader::TableReader;
 using toml_reader::Value;
 
 constexpr double repairable_skew = 0.02;       // of the largest entry of an inertia; misprints, not other matrices
 constexpr double repairable_direction = 1e-6;  // of a direction: rounding by hand
-constexpr size_t max_file_size = 16 << 20;     // [bytes]; no scene, but whatever was taken for one
 
 /// What reading fills besides the values.
 struct Reading {
@@ -36,41 +35,6 @@ struct Reading {
   std::vector<std::string> warnings;
   std::filesystem::path folder;  // that `file` of a body is relative to
 };
-
-std::string read_text(const std::filesystem::path& path) {
-  std::error_code error;
-  require(!std::filesystem::is_directory(path, error), path.string() + ": is a folder; give a file");
-  std::ifstream file(path, std::ios::binary);
-  require(file.good(), fmt::format("{}: cannot be opened: {}", path.string(), std::strerror(errno)));
-  std::string text(max_file_size + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  require(!file.bad(), path.string() + ": cannot be read");
-  text.resize(static_cast<size_t>(file.gcount()));
-  require(text.size() <= max_file_size, path.string() + ": is larger than 16 MB; that is no scene or body file");
-  return text;
-}
-
-bool is_blank(const std::string& text) { return text.find_first_not_of(" \t\r\n") == std::string::npos; }
-
-/// The parsed file. The faults of a file of another format are not worth listing.
-Value parse_format(const std::string& text, const std::string& file, std::string_view format) {
-  require(!is_blank(text),
-          fmt::format("{}:1:1: the file is empty; its first key must be format = \"{}\"", file, format));
-  Value root = toml_reader::parse(text, file);
-  for (const auto& [key, value] : root.entries) {
-    const bool other = key == "format" && value.kind == Value::Kind::text && value.text != format;
-    require(!other, fmt::format("{}:{}:{}: format: is {}; this version reads \"{}\" here", file, value.place.line,
-                                value.place.column, toml_reader::quoted(value.text), format));
-  }
-  return root;
-}
-
-void read_format(TableReader& table, std::string_view format) {
-  const std::string wanted = fmt::format("the first key must be format = \"{}\"", format);
-  if (!table.has("format")) return table.fault("format", "is missing; " + wanted);
-  table.text("format");
-  if (table.value().entries.front().first != "format") table.fault("format", "stands behind other keys; " + wanted);
-}
 
 Matrix3d read_inertia(TableReader& table, std::string_view key, const std::optional<Matrix3d>& otherwise,
                       Reading& reading) {
@@ -233,7 +197,7 @@ BodyScene read_whole_body(TableReader& table, Reading& reading) {
 
 // Key paths of the body file become those of the entry that names it, each with its own place.
 BodyScene read_body_file(const std::filesystem::path& path, const std::string& key_path, Reading& reading) {
-  const Value root = parse_format(read_text(path), path.string(), scene_keys::body_format);
+  const Value root = parse_format(read_text(path.string()), path.string(), scene_keys::body_format);
   TableReader table(root, key_path, reading.faults);
   read_format(table, scene_keys::body_format);
   BodyScene body = read_whole_body(table, reading);
@@ -451,7 +415,7 @@ Scene parse_scene(const std::string& text, const std::string& file_name, const s
 }
 
 Scene read_scene(const std::filesystem::path& path) {
-  return parse_scene(read_text(path), path.string(), path.parent_path());
+  return parse_scene(read_text(path.string()), path.string(), path.parent_path());
 }
 
 BodyScene read_body(const std::filesystem::path& path) {

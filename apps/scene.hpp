@@ -15,6 +15,8 @@
 
 namespace flexboom {
 
+class SavedState;
+
 /// A rigid body of a scene with joints.
 struct RigidScene {
   double mass = 0;                                    // [kg]
@@ -100,6 +102,8 @@ struct Scene {
   std::vector<WheelScene> wheels;
   std::vector<TurnScene> turns;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // inertial axes [m/s^2]
+
+  std::shared_ptr<const SavedState> from;  // instead of the start: where an earlier run ended; not part of the file
 
   std::vector<std::string> warnings;  // what was repaired or is odd (e.g. an inertia that is not symmetric)
 };

@@ -182,11 +182,12 @@ std::vector<std::string> output_names(const Scene& scene, const System& system) 
 
 }  // namespace
 
-OutputTable output_table(const Scene& scene, const System& system, const Trajectory& motion) {
+OutputTable output_table(const Scene& scene, const Flyable& f, const Trajectory& motion) {
+  const System& system = f.system;
   OutputTable table{output_names(scene, system), {}};
   const auto rows = static_cast<Eigen::Index>(motion.time.size());
   table.values.resize(rows, static_cast<Eigen::Index>(table.names.size()));
-  const State start = system.unpack(motion.y.front());
+  const State start = system.unpack(f.y0);
   Eigen::Vector4d back = start.attitude;
   back.tail<3>() *= -1;
   std::optional<Orbit> orbit;
@@ -288,6 +289,7 @@ IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, 
   IntegratorOptions o;
   o.method = scene.integrator == "auto" ? chosen : scene.integrator;
   o.tolerance = scene.tolerance;
+  o.start = scene.from ? scene.from->time() : 0;
   o.duration = scene.duration;
   o.output_step = scene.output_step;
   o.settle = scene.settle;
@@ -297,6 +299,24 @@ IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, 
   if (max_steps > 0) o.max_steps = max_steps;
   return o;
 }
+
+FlightState end_of(const Run& run) {
+  FlightState end;
+  end.time = run.motion.time.back();
+  end.y = run.motion.y.back();
+  for (const PreparedBody& p : run.bodies) end.modes[p.body.name] = p.body.n();
+  return end;
+}
+
+namespace {
+
+std::vector<std::string> hinge_names(const System& system) {
+  std::vector<std::string> names;
+  for (const Appendage& a : system.appendages()) names.push_back(a.body.name);
+  return names;
+}
+
+}  // namespace
 
 Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_steps) {
   const Stopwatch start;
@@ -310,12 +330,21 @@ Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_ste
     return flown;
   }
   const Flyable f = make_system(scene, r.bodies);
+  IntegratorOptions options = integrator_options(scene, hooks, redundant ? "ida" : "exponential", max_steps);
+  VectorXd y = f.y0;
+  if (scene.from) {
+    y = scene.from->values(state_names(f.system));
+    options.stops = scene.from->stops(hinge_names(f.system));
+  }
   r.prepare_seconds = start.seconds();
   const Stopwatch flight;
-  const IntegratorOptions options = integrator_options(scene, hooks, redundant ? "ida" : "exponential", max_steps);
-  r.motion = redundant ? integrate_by_multipliers(f, options) : integrate(f.system, f.y0, options);
+  r.motion = redundant ? integrate_by_multipliers(f.system, y, options) : integrate(f.system, y, options);
   r.integrate_seconds = flight.seconds();
-  r.outputs = output_table(scene, f.system, r.motion);
+  r.outputs = output_table(scene, f, r.motion);
+  r.end = end_of(r);
+  const IntegrationSummary& s = r.motion.summary;
+  r.end.names = state_names(f.system);
+  for (size_t i = 0; i < s.stops.size(); ++i) r.end.stops[f.system.appendages()[i].body.name] = s.stops[i];
   return r;
 }
 
@@ -377,6 +406,9 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks) {
   validate(r.scene);
   choose_modes(r.scene, hooks, r.plan);
   Run run = run_once(r.scene, hooks);
+  if (r.scene.from)
+    r.plan.push_back(
+        fmt::format("start: goes on from {} at t = {:g} s", r.scene.from->file().string(), r.scene.from->time()));
   describe(r.scene, run, r.plan);
   r.warnings = r.scene.warnings;
   r.warnings.insert(r.warnings.end(), run.warnings.begin(), run.warnings.end());
@@ -396,6 +428,7 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks) {
   r.tree = std::move(run.tree);
   r.trajectory = std::move(run.motion);
   r.outputs = std::move(run.outputs);
+  r.end = std::move(run.end);
   r.prepare_seconds = run.prepare_seconds;
   r.integrate_seconds = run.integrate_seconds;
   return r;

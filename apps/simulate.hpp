@@ -1,5 +1,6 @@
 #pragma once
 
+#include "apps/flight_state.hpp"
 #include "apps/scene.hpp"
 #include "dynamics/integrator.hpp"
 #include "dynamics/tree.hpp"
@@ -49,6 +50,7 @@ struct RunResult {
   Trajectory trajectory;
   std::shared_ptr<const Tree> tree;  // of a scene with joints: what was flown
   OutputTable outputs;
+  FlightState end;  // from which another run can go on
   ErrorBudget budget;
   std::vector<std::string> plan;  // what was chosen and why, one line each
   std::vector<std::string> warnings;
@@ -57,7 +59,7 @@ struct RunResult {
   double budget_seconds = 0;
 };
 
-/// The system of a scene and its start state.
+/// The system of a scene and the state at t = 0.
 struct Flyable {
   System system;
   Eigen::VectorXd y0;
@@ -80,6 +82,7 @@ struct Run {
   std::vector<PreparedBody> bodies;
   Trajectory motion;
   OutputTable outputs;
+  FlightState end;
   double prepare_seconds = 0, integrate_seconds = 0;
 
   // Of a scene with joints; the states and events of `motion` are then those of the tree, its balance is empty.
@@ -95,8 +98,11 @@ IntegratorOptions integrator_options(const Scene&, const RunHooks&, std::string_
 /// `max_steps` > 0 bounds its cost: NumericalError above.
 Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
 
-/// Columns of trajectory.csv.
-OutputTable output_table(const Scene&, const System&, const Trajectory&);
+/// Columns of trajectory.csv, of a motion that began at the flyable's start or went on from there.
+OutputTable output_table(const Scene&, const Flyable&, const Trajectory&);
+
+/// Time, numbers and modes at the end of a flight; names and stops are for the caller.
+FlightState end_of(const Run&);
 
 /// Largest relative difference over the wanted outputs that both tables have (all when `wanted` is empty): for each
 /// output, a vector counting as one, max over time of |a - b| over max |b|.

@@ -61,6 +61,13 @@ inline Value& Value::operator=(Value&&) noexcept = default;
 /// @throws InputError `file:line:column: what is wrong` for text that is not TOML or not UTF-8.
 Value parse(const std::string& text, const std::string& file);
 
+/// The text of a file. @throws InputError when it cannot be read or is larger than any file of ours.
+std::string read_text(const std::string& path);
+
+/// As parse, of a file whose first key says that it has this format: the faults of another format are not worth
+/// listing.
+Value parse_format(const std::string& text, const std::string& file, std::string_view format);
+
 /// Collects faults under key paths such as "bodies[1].segments[0].length". Only the first fault of a key is kept, and
 /// none below a key that is faulty itself: what follows from a fault is noise.
 class Faults {
@@ -144,6 +151,9 @@ class TableReader {
   Faults* faults_;
   std::vector<std::string> known_;
 };
+
+/// Adds a fault where the first key is not the format.
+void read_format(TableReader&, std::string_view format);
 
 /// `is "X"; it must be "a", "b" or "c"`, with the nearest name first asked for where one is near.
 std::string not_among(const std::string& value, std::span<const std::string_view> names);

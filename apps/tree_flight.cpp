@@ -184,6 +184,24 @@ TreeState start_state(const Scene& scene, const Tree& tree) {
   return s;
 }
 
+VectorXd first_state(const Scene& scene, const Tree& tree) {
+  return scene.from ? scene.from->values(state_names(tree)) : tree.pack(start_state(scene, tree));
+}
+
+std::vector<std::string> joint_names(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const JointScene& j : scene.joints) names.push_back(j.name);
+  return names;
+}
+
+void set_end(Run& run, const Scene& scene) {
+  run.end = end_of(run);
+  run.end.names = state_names(*run.tree);
+  const std::vector<StopHistory>& stops = run.motion.summary.stops;
+  for (size_t i = 0; i < stops.size(); ++i)
+    if (scene.joints[i].mechanism.stop_stiffness > 0) run.end.stops[scene.joints[i].name] = stops[i];
+}
+
 void set_corners(const Scene& scene, IntegratorOptions& o) {
   const auto add_corners = [&](const TimeCourse& c) {
     for (const double t : c.corners)
@@ -220,7 +238,7 @@ bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty
 std::vector<Stiffening> first_choice(const Scene& scene, const Multibody& bodies) {
   const Tree plain(bodies);
   std::vector<Stiffening> choice =
-      stiffening_where_it_counts(bodies, start_state(scene, plain), scene.duration, scene.tolerance);
+      stiffening_where_it_counts(bodies, plain.unpack(first_state(scene, plain)), scene.duration, scene.tolerance);
   for (size_t i = 0; i < choice.size(); ++i) {
     if (scene.bodies[i].stiffening == "on" && bodies.bodies[i].n() > 0) choice[i] = Stiffening::on;
     if (scene.bodies[i].stiffening == "off" || !has_stiffening(bodies.bodies[i])) choice[i] = Stiffening::off;
@@ -253,7 +271,8 @@ double stiffening_left_out(const Tree& tree, const TreeTrajectory& flight) {
 Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
   const Stopwatch start;
   const Multibody multibody = make_multibody(scene, bodies);
-  const IntegratorOptions options = options_of(scene, multibody, hooks, max_steps);
+  IntegratorOptions options = options_of(scene, multibody, hooks, max_steps);
+  if (scene.from) options.stops = scene.from->stops(joint_names(scene));
   std::vector<Stiffening> stiffening = first_choice(scene, multibody);
   Run r;
   r.bodies = std::move(bodies);
@@ -262,7 +281,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   TreeTrajectory flight;
   do {
     r.tree = std::make_shared<const Tree>(multibody, stiffening);
-    flight = integrate(*r.tree, r.tree->pack(start_state(scene, *r.tree)), options);
+    flight = integrate(*r.tree, first_state(scene, *r.tree), options);
   } while (!flight.summary.interrupted && revise(scene, *r.tree, flight, stiffening));
   r.outputs = tree_output_table(scene, *r.tree, flight);
   r.stiffening_effect = flight.stiffening_effect;
@@ -273,6 +292,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   r.motion.events = std::move(flight.events);
   r.motion.summary = std::move(flight.summary);
   r.integrate_seconds = flight_time.seconds();
+  set_end(r, scene);
   return r;
 }
 

@@ -15,6 +15,14 @@ Multibody make_multibody(const Scene&, const std::vector<PreparedBody>&);
 /// Start values of its joints.
 TreeState start_state(const Scene&, const Tree&);
 
+/// Where its flight begins: there, or where an earlier run ended. @throws InputError for a state of another scene.
+Eigen::VectorXd first_state(const Scene&, const Tree&);
+
+std::vector<std::string> joint_names(const Scene&);
+
+/// Sets the end of a flight of a scene with joints.
+void set_end(Run&, const Scene&);
+
 /// The boom's, rigid or reduced body of a scene with joints, with its geometric stiffness where it has one.
 PreparedBody prepare_rigid(const BodyScene&);
 PreparedBody prepare_reduced(const BodyScene&);

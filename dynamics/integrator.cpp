@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 namespace flexboom {
 
@@ -142,34 +141,24 @@ class Scales {
 /// Which stops are closed, which crossings are looked for.
 struct Contacts {
   std::vector<char> closed, armed;
-  std::vector<double> largest_rate;
-  std::vector<double> settled_since;
+  std::vector<StopHistory> history;
 };
 
 /// Stops at the start: closed beyond the threshold; exactly on it, by where the hinge is going, and at rest there by
-/// where it is pushed.
-Contacts contacts_at_start(const System& system, const VectorXd& y) {
+/// where it is pushed. Those that had settled are as good as open.
+Contacts contacts_at_start(const System& system, const VectorXd& y, const IntegratorOptions& options) {
   const size_t n = system.appendages().size();
-  Contacts c{std::vector<char>(n, 0), std::vector<char>(n, 0), std::vector<double>(n, 0.0),
-             std::vector<double>(n, -1.0)};
+  Contacts c{std::vector<char>(n, 0), std::vector<char>(n, 0), stops_at_start(options, n)};
   VectorXd y_dot(y.size());
-  system.derivative(y.data(), c.closed, *system.workspace(), y_dot.data());
+  system.derivative(options.start, y.data(), c.closed, *system.workspace(), y_dot.data());
   for (size_t i = 0; i < n; ++i) {
     const int hinge = static_cast<int>(i);
     const double gap = system.gap(y.data(), hinge), rate = system.gap_rate(y.data(), hinge);
     const double push = system.gap_rate(y_dot.data(), hinge);
-    c.armed[i] = system.appendages()[i].hinge.mechanism.stop_stiffness > 0;
+    c.armed[i] = system.appendages()[i].hinge.mechanism.stop_stiffness > 0 && c.history[i].settled < 0;
     c.closed[i] = c.armed[i] && (gap > 0 || (gap == 0 && (rate > 0 || (rate == 0 && push > 0))));
   }
   return c;
-}
-
-void check_options(const IntegratorOptions& o) {
-  require(o.tolerance > 0 && o.tolerance <= 0.1, fmt::format("tolerance {:g} must lie in (0, 0.1]", o.tolerance));
-  require(o.duration > 0 && std::isfinite(o.duration), fmt::format("duration {:g} s must be positive", o.duration));
-  require(o.output_step > 0, fmt::format("output step {:g} s must be positive", o.output_step));
-  require(o.duration / o.output_step <= 1e6,
-          fmt::format("{:.3g} output times are too many; choose a longer output step", o.duration / o.output_step));
 }
 
 /// One run: the event loop around a method.
@@ -181,7 +170,9 @@ class Flight {
         settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
         scales_(system, y0, method.local_share * options.tolerance, options.rescale_at_events),
         stepper_(method.make(system, scales_.error())),
-        contacts_(contacts_at_start(system, y0)),
+        contacts_(contacts_at_start(system, y0, options)),
+        outputs_(options),
+        t_(options.start),
         y_(y0),
         sample_(y0),
         y_dot_(y0.size()),
@@ -190,8 +181,8 @@ class Flight {
 
   Trajectory fly() {
     const Stopwatch start;
-    record(0.0, y_);
-    stepper_->restart(0.0, y_, contacts_.closed, contacts_.armed);
+    record(t_, y_);
+    stepper_->restart(t_, y_, contacts_.closed, contacts_.armed);
     while (t_ < options_.duration && !stopped()) advance();
     finish(start.seconds());
     return std::move(result_);
@@ -233,14 +224,7 @@ class Flight {
     }
   }
 
-  /// Time of the next output; the last one is the end exactly.
-  double output_time() const {
-    const auto k = static_cast<double>(result_.time.size());
-    const double next = k * options_.output_step;
-    const double last = options_.duration;
-    if (next < last * (1 - 1e-12)) return next;
-    return result_.time.back() < last ? last : std::numeric_limits<double>::infinity();
-  }
+  double output_time() const { return outputs_.after(result_.time.size()); }
 
   void record(double t, const VectorXd& y) {
     result_.time.push_back(t);
@@ -260,7 +244,7 @@ class Flight {
     for (size_t i = 0; i < crossed_.size(); ++i) {
       const int hinge = static_cast<int>(i);
       const double rate = system_.gap_rate(y_.data(), hinge);
-      double& largest = contacts_.largest_rate[i];
+      double& largest = contacts_.history[i].largest_rate;
       largest = std::max(largest, std::abs(rate));
       const bool slipped = slipped_through(i);
       if (crossed_[i] != 0 || slipped) {
@@ -271,7 +255,7 @@ class Flight {
         result_.events.push_back({t_, hinge, contact, rate});
         changed = true;
         if (std::abs(rate) < settle_ * largest && !pushed(i)) settle(i);
-      } else if (contacts_.settled_since[i] >= 0 && std::abs(rate) > 2 * settle_ * largest) {
+      } else if (contacts_.history[i].settled >= 0 && std::abs(rate) > 2 * settle_ * largest) {
         wake(i);
         changed = true;
       }
@@ -295,17 +279,17 @@ class Flight {
     const Appendage& a = system_.appendages()[i];
     const double period = std::sqrt(a.body.J0(2, 2) / (a.hinge.mechanism.stiffness + a.hinge.mechanism.stop_stiffness));
     const double push = system_.gap_rate(y_dot_.data(), static_cast<int>(i));
-    return std::abs(push) * period > 2 * settle_ * contacts_.largest_rate[i];
+    return std::abs(push) * period > 2 * settle_ * contacts_.history[i].largest_rate;
   }
 
   void settle(size_t i) {
-    contacts_.settled_since[i] = t_;
+    contacts_.history[i].settled = t_;
     contacts_.armed[i] = 0;
     contacts_.closed[i] = 0;
   }
 
   void wake(size_t i) {
-    contacts_.settled_since[i] = -1;
+    contacts_.history[i].settled = -1;
     contacts_.armed[i] = 1;
     contacts_.closed[i] = system_.gap(y_.data(), static_cast<int>(i)) > 0;
   }
@@ -321,10 +305,12 @@ class Flight {
     s.newton_iterations = c.newton_iterations;
     s.error_test_failures = c.error_test_failures;
     s.seconds = seconds;
-    s.settled = contacts_.settled_since;
+    s.stops = contacts_.history;
     if (s.interrupted && result_.time.back() < t_) record(t_, y_);
     conservation(s);
   }
+
+  double dissipated(size_t output) const { return result_.y[output][system_.layout().dissipated()]; }
 
   /// Energy and momentum balances over the outputs.
   void conservation(IntegrationSummary& s) const {
@@ -332,7 +318,7 @@ class Flight {
     double energy = 0, gap = 0, dP = 0, dH = 0, P = 0, H = 0;
     for (size_t i = 0; i < result_.time.size(); ++i) {
       const Balance& b = result_.balance[i];
-      const double total = b.kinetic + b.elastic + result_.y[i][system_.layout().dissipated()];
+      const double total = b.kinetic + b.elastic + dissipated(i) - dissipated(0);
       energy = std::max(energy, std::abs(b.kinetic) + std::abs(b.elastic));
       gap = std::max(gap, std::abs(total - (first.kinetic + first.elastic)));
       dP = std::max(dP, (b.momentum - first.momentum).norm());
@@ -350,7 +336,8 @@ class Flight {
   Scales scales_;
   std::unique_ptr<Stepper> stepper_;
   Contacts contacts_;
-  double t_ = 0;
+  OutputTimes outputs_;
+  double t_;
   VectorXd y_, sample_, y_dot_;
   WorkspaceHandle work_;
   std::vector<int> crossed_;
@@ -363,7 +350,7 @@ class Flight {
 std::span<const IntegratorMethod> integrator_methods() { return methods; }
 
 Trajectory integrate(const System& system, const VectorXd& y0, const IntegratorOptions& options) {
-  check_options(options);
+  check_options(options, system.appendages().size());
   require(y0.size() == system.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   if (system.field()) system.field()->orbit.at(options.duration);  // does it last so long?
   return Flight(system, y0, options, method_named(options.method)).fly();

@@ -1,11 +1,10 @@
 #pragma once
 
+#include "dynamics/flight.hpp"
 #include "dynamics/system.hpp"
 
 #include <Eigen/Core>
 
-#include <atomic>
-#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -14,25 +13,11 @@
 
 namespace flexboom {
 
-struct IntegratorOptions {
+struct IntegratorOptions : FlightOptions {
   std::string method = "exponential";
-  double tolerance = 1e-6;    // relative error wanted in every output (max over time / max of the output)
-  double duration = 10;       // [s]
-  double output_step = 0.01;  // [s]
-  /// A hinge whose rate at the stop falls below this fraction of its largest rate so far has settled: its crossings are
-  /// no longer located (its stop counts as open) until the rate doubles. Negative: tolerance / 100. Zero: never.
-  double settle = -1;
   /// Measure the hinge's error against its motion since the last event instead of its largest motion: late, tiny
-  /// contacts keep their relative accuracy. Costs steps.
+  /// contacts keep their relative accuracy. Costs steps. Of a System.
   bool rescale_at_events = false;
-  /// Times where forces or prescribed motions are not smooth, ascending [s]: a step ends there and the method starts
-  /// anew. Of trees.
-  std::vector<double> corners{};
-  /// No step passes an output: what forces do for as long as that is not stepped over. Of trees.
-  bool step_to_outputs = false;
-  long max_steps = 200'000'000;
-  const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
-  std::function<void(double time, double duration)> progress;  // called now and then
 };
 
 /// A crossing of a stop.
@@ -54,10 +39,10 @@ struct IntegrationSummary {
   long error_test_failures = 0;
   long restarts = 0;
   double seconds = 0;
-  double energy_balance = 0;    // max |E + dissipated - E0| / max E
-  double momentum_drift = 0;    // max change of linear and angular momentum, each over its scale; 0 in a field
-  double constraint_drift = 0;  // max | |quaternion| - 1 |; the joints are exact in relative coordinates
-  std::vector<double> settled;  // per hinge: time after which its stop was no longer looked at, or -1
+  double energy_balance = 0;       // max |E + dissipated - E0| / max E
+  double momentum_drift = 0;       // max change of linear and angular momentum, each over its scale; 0 in a field
+  double constraint_drift = 0;     // max | |quaternion| - 1 |; the joints are exact in relative coordinates
+  std::vector<StopHistory> stops;  // per hinge of a System, per joint of other scenes
   bool interrupted = false;
 };
 
@@ -69,7 +54,7 @@ struct Trajectory {
   IntegrationSummary summary;
 };
 
-/// Flies the system from y0 at t = 0.
+/// Flies the system from y0 at the start.
 /// @throws InputError for an unknown method (listing those that exist) or bad options; NumericalError when the method
 /// fails.
 Trajectory integrate(const System&, const Eigen::VectorXd& y0, const IntegratorOptions&);

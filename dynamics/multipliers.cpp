@@ -229,18 +229,18 @@ std::vector<BodyState> place_bodies(const Multibody& scene, const std::vector<st
   return states;
 }
 
-std::vector<BodyState> close_joints(const Multipliers& system, std::vector<BodyState> states) {
+std::vector<BodyState> close_joints(const Multipliers& system, std::vector<BodyState> states, double t) {
   Equations e(system.impl());
   require(states.size() == system.multibody().bodies.size(), "one state per body is needed");
   VectorXd y = e.pack(states);
   // Rows that depend on others at one configuration need not do so at the next.
   for (int round = 0; round < 3; ++round) {
-    e.keep_rows(constraint_rank(e, 0, y.data()).kept);
+    e.keep_rows(constraint_rank(e, t, y.data()).kept);
     y.conservativeResize(e.size());
-    e.project(0, y);
+    e.project(t, y);
   }
   Equations::RowValues values;
-  e.row_values(0, y.data(), values);
+  e.row_values(t, y.data(), values);
   const Violation v = violation(e, values.g);
   if (!(v.position < 1e-9 && v.angle < 1e-9)) {
     const bool place = !(v.position < 1e-9);
@@ -248,7 +248,7 @@ std::vector<BodyState> close_joints(const Multipliers& system, std::vector<BodyS
                                  describe(e, place ? v.worst_position : v.worst_angle), place ? v.position : v.angle,
                                  place ? "m" : "rad"));
   }
-  check_branches(e, 0, y.data());
+  check_branches(e, t, y.data());
   return e.unpack(y.data());
 }
 

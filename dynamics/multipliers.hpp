@@ -1,12 +1,11 @@
 #pragma once
 
+#include "dynamics/flight.hpp"
 #include "dynamics/multibody.hpp"
 #include "dynamics/system.hpp"
 
 #include <Eigen/Core>
 
-#include <atomic>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -48,21 +47,10 @@ struct MultibodyState {
   std::vector<BodyAcceleration> accelerations;
 };
 
-struct MultipliersOptions {
-  double tolerance = 1e-6;    // relative error wanted in every output (max over time / max of the output)
-  double duration = 10;       // [s]
-  double output_step = 0.01;  // [s]
-  /// As in IntegratorOptions: below this part of its largest rate a hinge on its stop has settled. Negative: tolerance
-  /// / 100. Zero: never.
-  double settle = -1;
-  std::vector<double> angles{};  // per joint: a hinge starts at the turn nearest to this [rad]; empty: to its rest
-  /// As in IntegratorOptions: where functions of time are not smooth, ascending [s]; no step passes an output.
-  std::vector<double> corners{};
-  bool step_to_outputs = false;
+struct MultipliersOptions : FlightOptions {
+  std::vector<double> angles{};       // per joint: a hinge starts at the turn nearest to this [rad]; empty: to its rest
+  double dissipated = 0, work = 0;    // before the start [J]
   std::string linear_solver = "klu";  // or "dense"
-  long max_steps = 200'000'000;
-  const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
-  std::function<void(double time, double duration)> progress;  // called now and then
 };
 
 /// A crossing of the stop of a joint.
@@ -85,7 +73,7 @@ struct MultipliersSummary {
   double energy_balance = 0;           // max |E + dissipated - work - E0| / max E
   double momentum_drift = 0;           // of both momenta, each over its scale; 0 where something holds or pushes
   std::vector<std::string> redundant;  // constraint rows left out, by joint
-  std::vector<double> settled;         // per joint: time after which its stop was no longer looked at, or -1
+  std::vector<StopHistory> stops;      // per joint
   bool interrupted = false;
 };
 
@@ -123,11 +111,11 @@ class Multipliers {
 std::vector<BodyState> place_bodies(const Multibody&, const std::vector<std::vector<double>>& coordinates,
                                     const std::vector<std::vector<double>>& rates = {});
 
-/// Moves the bodies as little as needed (mass metric) until every joint closes at t = 0, positions and velocities.
+/// Moves the bodies as little as needed (mass metric) until every joint closes at t [s], positions and velocities.
 /// @throws InputError naming the joint that stays open.
-std::vector<BodyState> close_joints(const Multipliers&, std::vector<BodyState>);
+std::vector<BodyState> close_joints(const Multipliers&, std::vector<BodyState>, double t = 0);
 
-/// Flies the bodies from t = 0 with SUNDIALS IDA.
+/// Flies the bodies from the start with SUNDIALS IDA.
 /// @throws InputError when the start does not fulfil a joint (naming it) or the options are bad; NumericalError when
 /// the method fails or a loop locks, naming the joint.
 MultibodyTrajectory integrate_multipliers(const Multipliers&, const std::vector<BodyState>& start,

@@ -58,9 +58,10 @@ void set_drifts(const Multibody& scene, MultibodyTrajectory& r) {
   double energy = 0, gap = 0, dP = 0, dH = 0, P = 0, H = 0;
   for (size_t i = 0; i < r.time.size(); ++i) {
     const Balance& b = r.balance[i];
-    const MultibodyState& at = r.states[i];
+    const MultibodyState &at = r.states[i], &start = r.states.front();
     energy = std::max({energy, std::abs(b.kinetic) + std::abs(b.elastic), std::abs(at.work), at.dissipated});
-    gap = std::max(gap, std::abs(b.kinetic + b.elastic - first.kinetic - first.elastic - at.work + at.dissipated));
+    const double since = at.dissipated - start.dissipated - (at.work - start.work);
+    gap = std::max(gap, std::abs(b.kinetic + b.elastic - first.kinetic - first.elastic + since));
     dP = std::max(dP, (b.momentum - first.momentum).norm());
     dH = std::max(dH, (b.angular_momentum - first.angular_momentum).norm());
     P = std::max(P, b.momentum_scale);

@@ -24,14 +24,6 @@ constexpr double local_share = 0.02;
 /// A violation of a joint at the start beyond this [m, rad, their rates] is the caller's mistake.
 constexpr double open_joint = 1e-8;
 
-void check_options(const MultipliersOptions& o) {
-  require(o.tolerance > 0 && o.tolerance <= 0.1, fmt::format("tolerance {:g} must lie in (0, 0.1]", o.tolerance));
-  require(o.duration > 0 && std::isfinite(o.duration), fmt::format("duration {:g} s must be positive", o.duration));
-  require(o.output_step > 0, fmt::format("output step {:g} s must be positive", o.output_step));
-  require(o.duration / o.output_step <= 1e6,
-          fmt::format("{:.3g} output times are too many; choose a longer output step", o.duration / o.output_step));
-}
-
 /// One run: the events around IDA.
 class MultipliersFlight final : public DaeProblem {
  public:
@@ -39,19 +31,20 @@ class MultipliersFlight final : public DaeProblem {
       : equations_(system.impl()),
         scene_(system.multibody()),
         options_(options),
-        settle_(options.settle < 0 ? options.tolerance / 100 : options.settle) {
+        outputs_(options),
+        settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
+        t_(options.start),
+        history_(stops_at_start(options, scene_.joints.size())) {
     const size_t joints = scene_.joints.size();
     memory_ = {std::vector<char>(joints, 0), std::vector<double>(joints, 0.0)};
-    largest_rate_.assign(joints, 0);
     largest_gap_.assign(joints, 0);
-    result_.summary.settled.assign(joints, -1);
     for (size_t i = 0; i < joints; ++i)
       if (equations_.joints()[i].stop) stops_.push_back(i);
-    armed_.assign(stops_.size(), 1);
+    for (const size_t joint : stops_) armed_.push_back(history_[joint].settled < 0);
     crossed_.assign(stops_.size(), 0);
     start_on_constraints(start);
     begin_contacts();
-    equations_.make_consistent(0, y_, y_dot_, memory_);
+    equations_.make_consistent(t_, y_, y_dot_, memory_);
     const Balance b = balance_of(equations_, y_, memory_);
     scales_ = std::make_unique<StateScales>(equations_, y_, y_dot_, std::abs(b.kinetic) + std::abs(b.elastic),
                                             local_share * options.tolerance, options.duration);
@@ -61,8 +54,8 @@ class MultipliersFlight final : public DaeProblem {
 
   MultibodyTrajectory fly() {
     const Stopwatch watch;
-    record(0, y_);
-    ida_->restart(0, y_, y_dot_);
+    record(t_, y_);
+    ida_->restart(t_, y_, y_dot_);
     while (t_ < options_.duration && !stopped()) advance();
     if (result_.summary.interrupted && result_.time.back() < t_) record(t_, y_);
     finish(watch.seconds());
@@ -113,16 +106,17 @@ class MultipliersFlight final : public DaeProblem {
     y_ = equations_.pack(start);
     require(y_.allFinite(), "the start state is not finite");
     Equations::RowValues values;
-    equations_.row_values(0, y_.data(), values);
+    equations_.row_values(t_, y_.data(), values);
     require_closed(violation(equations_, values.g), "m", "rad", "is open by");
-    check_branches(equations_, 0, y_.data());
-    const RankReport rank = constraint_rank(equations_, 0, y_.data());
+    check_branches(equations_, t_, y_.data());
+    const RankReport rank = constraint_rank(equations_, t_, y_.data());
     for (const RowName& n : rank.left_out) result_.summary.redundant.push_back(describe(equations_, n));
     margin_ = rank.margin;
     equations_.keep_rows(rank.kept);
     y_ = equations_.pack(start);
-    equations_.project(0, y_);
-    equations_.row_values(0, y_.data(), values);
+    y_[equations_.dissipated()] = options_.dissipated, y_[equations_.work()] = options_.work;
+    equations_.project(t_, y_);
+    equations_.row_values(t_, y_.data(), values);
     require_closed(violation(equations_, values.g_dot), "m/s", "rad/s",
                    "can not follow: its motion is prescribed against other joints', by");
     rows_ = rates_ = VectorXd::Zero(equations_.all_rows());
@@ -145,12 +139,12 @@ class MultipliersFlight final : public DaeProblem {
     }
     follow_turns();
     VectorXd y = y_;
-    equations_.make_consistent(0, y, y_dot_, memory_);
+    equations_.make_consistent(t_, y, y_dot_, memory_);
     for (size_t i = 0; i < stops_.size(); ++i) {
       const DriveMotion<double> g = gap(i, y_.data());
       const double push = rate_of_rate(i, y);
       const bool on = std::abs(g.value) < 4e-16;
-      memory_.closed[stops_[i]] = on ? g.rate > 0 || (g.rate == 0 && push > 0) : g.value > 0;
+      memory_.closed[stops_[i]] = armed_[i] && (on ? g.rate > 0 || (g.rate == 0 && push > 0) : g.value > 0);
     }
   }
 
@@ -169,7 +163,7 @@ class MultipliersFlight final : public DaeProblem {
   }
 
   void record_pattern() {
-    equations_.newton(0, 1, y_.data(), y_dot_.data(), memory_, assembly_);
+    equations_.newton(t_, 1, y_.data(), y_dot_.data(), memory_, assembly_);
     assembly_.finish(size(), options_.linear_solver == "dense");
   }
 
@@ -287,7 +281,7 @@ class MultipliersFlight final : public DaeProblem {
     for (size_t i = 0; i < stops_.size(); ++i) {
       const size_t joint = stops_[i];
       const DriveMotion<double> g = gap(i, y_.data());
-      double &largest = largest_rate_[joint], &reach = largest_gap_[joint];
+      double &largest = history_[joint].largest_rate, &reach = largest_gap_[joint];
       largest = std::max(largest, std::abs(g.rate));
       reach = std::max(reach, std::abs(g.value));
       const double noise = options_.tolerance * reach;
@@ -299,12 +293,12 @@ class MultipliersFlight final : public DaeProblem {
         result_.events.push_back({t_, static_cast<int>(joint), !closed, g.rate});
         changed = true;
         if (std::abs(g.rate) < settle_ * largest && !pushed(i)) {
-          result_.summary.settled[joint] = t_;
+          history_[joint].settled = t_;
           armed_[i] = 0;
           memory_.closed[joint] = 0;
         }
       } else if (!armed_[i] && std::abs(g.rate) > 2 * settle_ * largest) {
-        result_.summary.settled[joint] = -1;
+        history_[joint].settled = -1;
         armed_[i] = 1;
         memory_.closed[joint] = g.value > 0;
         changed = true;
@@ -321,7 +315,7 @@ class MultipliersFlight final : public DaeProblem {
     const ReducedBody& body = scene_.bodies[static_cast<size_t>(std::max(joint.b.body, 0))];
     const double inertia = joint.kind == JointKind::hinge ? body.J0.trace() / 3 : body.m;
     const double period = std::sqrt(inertia / (joint.mechanism.stiffness + joint.mechanism.stop_stiffness));
-    return std::abs(rate_of_rate(i, y)) * period > 2 * settle_ * largest_rate_[stops_[i]];
+    return std::abs(rate_of_rate(i, y)) * period > 2 * settle_ * history_[stops_[i]].largest_rate;
   }
 
   void write_outputs() {
@@ -336,11 +330,7 @@ class MultipliersFlight final : public DaeProblem {
     }
   }
 
-  double output_time() const {
-    const double next = static_cast<double>(result_.time.size()) * options_.output_step;
-    if (next <= options_.duration * (1 + 1e-12)) return std::min(next, options_.duration);
-    return result_.time.back() < options_.duration ? options_.duration : 2 * options_.duration;
-  }
+  double output_time() const { return outputs_.after(result_.time.size()); }
 
   /// Multipliers of an output are those of its motion, not interpolated.
   void record(double t, VectorXd y) {
@@ -375,19 +365,22 @@ class MultipliersFlight final : public DaeProblem {
     s.newton_iterations = c.newton_iterations, s.error_test_failures = c.error_test_failures;
     s.convergence_failures = c.convergence_failures;
     s.seconds = seconds;
+    s.stops = history_;
     set_drifts(scene_, result_);
   }
 
   Equations equations_;
   const Multibody& scene_;
   const MultipliersOptions& options_;
-  double settle_, margin_ = 1, t_ = 0;
+  OutputTimes outputs_;
+  double settle_, margin_ = 1, t_;
+  std::vector<StopHistory> history_;  // per joint
   JointMemory memory_;
   std::vector<size_t> stops_;  // joints with a stop
   std::vector<char> armed_;    // per stop
   std::vector<int> crossed_;
   std::vector<Clearance> before_;
-  std::vector<double> largest_rate_, largest_gap_;
+  std::vector<double> largest_gap_;
   VectorXd y_, y_dot_, sample_, rows_, rates_;
   Assembly assembly_;
   std::unique_ptr<StateScales> scales_;
@@ -400,7 +393,7 @@ class MultipliersFlight final : public DaeProblem {
 
 MultibodyTrajectory integrate_multipliers(const Multipliers& system, const std::vector<BodyState>& start,
                                           const MultipliersOptions& options) {
-  check_options(options);
+  check_options(options, system.multibody().joints.size());
   require(options.angles.empty() || options.angles.size() == system.multibody().joints.size(),
           "one angle per joint is needed");
   return MultipliersFlight(system, start, options).fly();

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace flexboom {
 
@@ -96,23 +95,24 @@ class TreeFlight {
         options_(options),
         settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
         scales_(tree, y0, method.local_share * options.tolerance),
+        outputs_(options),
         ode_(ode_of(tree)),
         stepper_(method.make(ode_of(tree), scales_.error())),
+        history_(stops_at_start(options, tree.scene().joints.size())),
+        t_(options.start),
         y_(y0),
         y_dot_(y0.size()) {
     const size_t stops = tree.stops().size();
     closed_.assign(stops, 0), armed_.assign(stops, 1), crossed_.assign(stops, 0);
-    largest_.assign(stops, 0.0);
     result_.summary.method = method.name;
-    result_.summary.settled.assign(stops, -1.0);
     result_.stiffening_effect.assign(tree.scene().bodies.size(), 0.0);
     contacts_at_start();
   }
 
   TreeTrajectory fly() {
     const Stopwatch start;
-    record(0.0, y_);
-    stepper_->restart(0.0, y_, closed_, armed_);
+    record(t_, y_);
+    stepper_->restart(t_, y_, closed_, armed_);
     while (t_ < options_.duration && !stopped()) advance();
     finish(start.seconds());
     return std::move(result_);
@@ -120,12 +120,13 @@ class TreeFlight {
 
  private:
   void contacts_at_start() {
-    ode_->derivative(0, y_.data(), closed_, y_dot_.data());
+    ode_->derivative(t_, y_.data(), closed_, y_dot_.data());
     for (size_t i = 0; i < closed_.size(); ++i) {
       const int stop = static_cast<int>(i);
       const double gap = ode_->gap(y_.data(), stop), rate = ode_->gap_rate(y_.data(), stop);
       const double push = ode_->gap_rate(y_dot_.data(), stop);
-      closed_[i] = gap > 0 || (gap == 0 && (rate > 0 || (rate == 0 && push > 0)));
+      armed_[i] = history(i).settled < 0;
+      closed_[i] = armed_[i] && (gap > 0 || (gap == 0 && (rate > 0 || (rate == 0 && push > 0))));
     }
   }
 
@@ -163,12 +164,7 @@ class TreeFlight {
     return end;
   }
 
-  /// Time of the next output; the last one is the end exactly.
-  double output_time() const {
-    const double next = static_cast<double>(result_.time.size()) * options_.output_step, last = options_.duration;
-    if (next < last * (1 - 1e-12)) return next;
-    return result_.time.back() < last ? last : std::numeric_limits<double>::infinity();
-  }
+  double output_time() const { return outputs_.after(result_.time.size()); }
 
   void record(double t, VectorXd y) {
     for (const TreeLayout::Joint& j : tree_.layout().joints) {
@@ -186,7 +182,8 @@ class TreeFlight {
 
   /// At every output of a short list, at some of a long one: an eigenvalue problem for each body.
   void look_at_stiffening(double t, const VectorXd& y) {
-    const auto stride = static_cast<size_t>(options_.duration / options_.output_step / 500) + 1;
+    const double outputs = (options_.duration - options_.start) / options_.output_step;
+    const auto stride = static_cast<size_t>(outputs / 500) + 1;
     if (result_.time.size() % stride != 0) return;
     std::vector<char> contact(tree_.scene().joints.size(), 0);
     for (size_t i = 0; i < closed_.size(); ++i) contact[static_cast<size_t>(tree_.stops()[i])] = closed_[i];
@@ -200,7 +197,7 @@ class TreeFlight {
     for (size_t i = 0; i < crossed_.size(); ++i) {
       const int joint = tree_.stops()[i];
       const double rate = tree_.gap_rate(y_.data(), joint);
-      largest_[i] = std::max(largest_[i], std::abs(rate));
+      history(i).largest_rate = std::max(history(i).largest_rate, std::abs(rate));
       const bool slipped = slipped_through(i);
       if (crossed_[i] != 0 || slipped) {
         double& gap = y_[tree_.layout().joints[static_cast<size_t>(joint)].scalar];
@@ -210,12 +207,12 @@ class TreeFlight {
         result_.events.push_back({t_, joint, contact, rate});
         changed = true;
         if (std::abs(rate) * period(i) < small(i) && !pushed(i)) {
-          result_.summary.settled[i] = t_;
+          history(i).settled = t_;
           armed_[i] = closed_[i] = 0;
         }
       } else if (!armed_[i] &&
                  (std::abs(rate) * period(i) > 2 * small(i) || tree_.gap(y_.data(), joint) > 2 * small(i))) {
-        result_.summary.settled[i] = -1;
+        history(i).settled = -1;
         armed_[i] = 1;
         closed_[i] = tree_.gap(y_.data(), joint) > 0;
         changed = true;
@@ -223,6 +220,9 @@ class TreeFlight {
     }
     return changed;
   }
+
+  StopHistory& history(size_t stop) { return history_[static_cast<size_t>(tree_.stops()[stop])]; }
+  const StopHistory& history(size_t stop) const { return history_[static_cast<size_t>(tree_.stops()[stop])]; }
 
   /// Is the gap on the wrong side of the flag, with no crossing found?
   bool slipped_through(size_t i) const {
@@ -239,7 +239,7 @@ class TreeFlight {
 
   /// Size of motions about the stop that are not followed: those the scene does not ask for, and those that are hardly
   /// more than noise, whose crossings would be as dense as the steps.
-  double small(size_t i) const { return std::max(settle_ * largest_[i] * period(i), 10 * noise(i)); }
+  double small(size_t i) const { return std::max(settle_ * history(i).largest_rate * period(i), 10 * noise(i)); }
 
   /// Time scale of a joint on its stop [s].
   double period(size_t i) const {
@@ -262,6 +262,7 @@ class TreeFlight {
     s.factorisations = c.factorisations, s.newton_iterations = c.newton_iterations;
     s.error_test_failures = c.error_test_failures;
     s.seconds = seconds;
+    s.stops = history_;
     if (s.interrupted && result_.time.back() < t_) record(t_, y_);
     conservation(s);
     warn();
@@ -305,12 +306,13 @@ class TreeFlight {
   const IntegratorOptions& options_;
   double settle_;
   TreeScales scales_;
+  OutputTimes outputs_;
   std::unique_ptr<Ode> ode_;
   std::unique_ptr<Stepper> stepper_;
   std::vector<char> closed_, armed_;
   std::vector<int> crossed_;
-  std::vector<double> largest_;
-  double t_ = 0;
+  std::vector<StopHistory> history_;  // per joint
+  double t_;
   VectorXd y_, y_dot_;
   long steps_ = 0;
   TreeTrajectory result_;
@@ -319,14 +321,10 @@ class TreeFlight {
 }  // namespace
 
 TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o) {
-  require(o.tolerance > 0 && o.tolerance <= 0.1, fmt::format("tolerance {:g} must lie in (0, 0.1]", o.tolerance));
-  require(o.duration > 0 && std::isfinite(o.duration), fmt::format("duration {:g} s must be positive", o.duration));
-  require(o.output_step > 0 && o.duration / o.output_step <= 1e6,
-          fmt::format("output step {:g} s must be positive, and not more than 1e6 of them in {:g} s", o.output_step,
-                      o.duration));
+  check_options(o, tree.scene().joints.size());
   require(y0.size() == tree.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   VectorXd start = y0;
-  tree.impose(0, start);
+  tree.impose(o.start, start);
   return TreeFlight(tree, start, o, method_named(o.method)).fly();
 }
 

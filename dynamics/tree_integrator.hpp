@@ -18,7 +18,7 @@ struct TreeTrajectory {
   std::vector<std::string> warnings;
 };
 
-/// Flies the tree from y0 at t = 0 with CVODE: "bdf" or "adams" (default where the options name the default of System).
+/// Flies the tree from y0 with CVODE: "bdf" or "adams" (default where the options name the default of System).
 /// `rescale_at_events` is not heard: errors are measured against the largest motion so far.
 /// A body whose geometric stiffness is off although its effect exceeds the tolerance is named in the warnings.
 /// @throws InputError for an unknown method or bad options; NumericalError when the method fails.

@@ -191,7 +191,7 @@ const OutputTable& converged() {
     IntegratorOptions o;
     o.method = "bdf";
     o.tolerance = 1e-11;
-    return output_table(scene, f.system, integrate(f.system, f.y0, o));
+    return output_table(scene, f, integrate(f.system, f.y0, o));
   }();
   return table;
 }
@@ -205,7 +205,7 @@ void TenSeconds(benchmark::State& state, const char* method) {
   o.tolerance = std::pow(10.0, -static_cast<double>(state.range(0)));
   Trajectory r;
   for (auto _ : state) r = integrate(f.system, f.y0, o);
-  const OutputTable table = output_table(scene, f.system, r);
+  const OutputTable table = output_table(scene, f, r);
   state.counters["hub.rotation"] = error_of(table, converged(), "hub.rotation");
   state.counters["slp.q"] = error_of(table, converged(), "slp.q");
   state.counters["steps"] = static_cast<double>(r.summary.steps);

@@ -353,9 +353,35 @@ class RunFiles(Case):
 
     def test_files_as_promised(self):
         folder = self.run_sport("--duration", "0.2")
-        self.assertEqual(sorted(os.listdir(folder)), ["events.csv", "scene.toml", "summary.json", "trajectory.csv"])
+        self.assertEqual(sorted(os.listdir(folder)), ["events.csv", "scene.toml", "state.toml", "summary.json", "trajectory.csv"])
         folder = self.run_sport("--duration", "0.2", "--report", "--vtu-step", "0.1", out="more")
         self.assertLess({"report.html", "motion.pvd", "motion_00000.vtu", "motion_00002.vtu"}, set(os.listdir(folder)))
+
+    def test_run_goes_on_where_another_ended(self):
+        whole = self.run_sport("--duration", "0.4", out="whole")
+        first = self.run_sport("--duration", "0.2", out="first")
+        later = self.run_sport("--duration", "0.4", "--continue", first, out="later")
+        a, b = columns(whole / "trajectory.csv"), columns(later / "trajectory.csv")
+        np.testing.assert_array_equal(b["t"], a["t"][20:])
+        for name in ("hub.rotation.x", "sip.angle", "energy.dissipated"):
+            np.testing.assert_allclose(b[name], a[name][20:], atol=1e-5 * np.abs(a[name]).max(), err_msg=name)
+        self.assertIn("goes on from", "\n".join(self.summary(later)["plan"]))
+        self.assertAlmostEqual(self.summary(later)["simulated_seconds"], 0.2)
+        # The same from the file; not into its own folder, nor back in time, nor from nothing or another scene.
+        self.assert_exit(OK, flexboom("run", "sport", "--duration", "0.3", "--no-budget", "--continue",
+                                      first / "state.toml", "--out", self.folder / "again"))
+        before = (first / "trajectory.csv").read_bytes()
+        for arguments, words in [(("--duration", "0.4", "--out", first), "would be overwritten"),
+                                 (("--duration", "0.1", "--out", self.folder / "out"), "the run ends at 0.1 s")]:
+            result = flexboom("run", "sport", "--continue", first, *arguments)
+            self.assert_exit(INPUT, result)
+            self.assertIn(words, result.stderr)
+        self.assertEqual((first / "trajectory.csv").read_bytes(), before)
+        result = flexboom("run", "sport", "--continue", self.folder / "nowhere", "--out", self.folder / "out")
+        self.assert_exit(INPUT, result)
+        result = flexboom("run", "tumbling", "--continue", first, "--out", self.folder / "out")
+        self.assert_exit(INPUT, result)
+        self.assertIn("state.toml:", result.stderr)
 
     def test_trajectory(self):
         folder = self.run_sport("--duration", "1.3", "--output-step", "0.02")

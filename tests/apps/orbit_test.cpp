@@ -34,7 +34,7 @@ OutputTable fly(const Scene& scene) {
   options.tolerance = scene.tolerance;
   options.duration = scene.duration;
   options.output_step = scene.output_step;
-  return output_table(scene, flyable.system, integrate(flyable.system, flyable.y0, options));
+  return output_table(scene, flyable, integrate(flyable.system, flyable.y0, options));
 }
 
 double largest(const OutputTable& table, const std::string& name) {

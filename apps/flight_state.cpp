@@ -1,0 +1,251 @@
+#include "apps/flight_state.hpp"
+
+#include "apps/toml_reader.hpp"
+#include "apps/toml_writer.hpp"
+#include "apps/version.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+#include <string_view>
+#include <utility>
+
+namespace flexboom {
+
+namespace fs = std::filesystem;
+using Eigen::Index;
+using Eigen::VectorXd;
+using toml_reader::Faults;
+using toml_reader::TableReader;
+using toml_reader::Value;
+using toml_writer::toml;
+
+namespace {
+
+constexpr std::string_view state_format = "flexboom-state-1";
+
+/// Names by place.
+class Names {
+ public:
+  explicit Names(int size) : names_(static_cast<size_t>(size)) {}
+
+  void set(int place, std::string name) { names_[static_cast<size_t>(place)] = std::move(name); }
+  void set_vector(int first, const std::string& stem) {
+    if (first < 0) return;
+    for (const char* axis : {".x", ".y", ".z"}) set(first++, stem + axis);
+  }
+  void set_quaternion(int first, const std::string& stem) {
+    if (first < 0) return;
+    set(first, stem + ".w");
+    set_vector(first + 1, stem);
+  }
+  /// Coordinates of a body and, from `rate` on, their rates.
+  void set_modes(int place, int rate, int n, const std::string& body) {
+    for (int k = 0; k < n; ++k) {
+      set(place + k, fmt::format("{}.q{}", body, k + 1));
+      set(rate + k, fmt::format("{}.q{}.rate", body, k + 1));
+    }
+  }
+  std::vector<std::string> take() { return std::move(names_); }
+
+ private:
+  std::vector<std::string> names_;
+};
+
+}  // namespace
+
+std::vector<std::string> state_names(const System& system) {
+  const Layout& l = system.layout();
+  Names names(l.size);
+  for (size_t i = 0; i < l.body.size(); ++i) {
+    const ReducedBody& body = system.appendages()[i].body;
+    const int place = l.body[i], rate = l.p + l.base + place;
+    names.set(place, body.name + ".gap");
+    names.set(rate, body.name + ".rate");
+    names.set_modes(place + 1, rate + 1, body.n(), body.name);
+  }
+  if (!system.fixed_hub()) {
+    names.set_vector(l.u_begin(), "hub.rate");
+    names.set_vector(l.position(), "hub.position");
+    names.set_quaternion(l.attitude(), "hub.attitude");
+    names.set_vector(l.velocity(), "hub.velocity");
+  }
+  names.set(l.dissipated(), "energy.dissipated");
+  return names.take();
+}
+
+std::vector<std::string> state_names(const Tree& tree) {
+  const TreeLayout& l = tree.layout();
+  Names names(l.size);
+  for (size_t i = 0; i < l.joints.size(); ++i) {
+    const TreeLayout::Joint& at = l.joints[i];
+    const Joint& joint = tree.scene().joints[i];
+    const int scalars = joint_type(joint.kind).scalars;
+    for (int k = 0; k < scalars; ++k) {
+      const std::string number = scalars > 1 ? std::to_string(k + 1) : "";
+      names.set(at.scalar + k, joint.name + ".gap" + number);
+      names.set(l.rate(at.scalar + k), joint.name + ".rate" + number);
+    }
+    names.set_vector(at.omega, joint.name + ".omega");
+    names.set_vector(at.position, joint.name + ".position");
+    names.set_quaternion(at.attitude, joint.name + ".attitude");
+    names.set_vector(at.velocity, joint.name + ".velocity");
+    names.set(at.dissipated, joint.name + ".dissipated");
+  }
+  for (size_t b = 0; b < l.q.size(); ++b) {
+    const ReducedBody& body = tree.scene().bodies[b];
+    names.set_modes(l.q[b], l.rate(l.q[b]), body.n(), body.name);
+  }
+  for (size_t i = 0; i < tree.scene().wheels.size(); ++i)
+    names.set(l.spin + static_cast<int>(i), tree.scene().wheels[i].name + ".spin");
+  names.set(l.dissipated_elsewhere, "energy.dissipated_elsewhere");
+  names.set(l.work, "energy.work");
+  return names.take();
+}
+
+std::string to_toml(const FlightState& state, const std::string& scene) {
+  toml_writer::Writer out;
+  out.key("format", state_format);
+  out.key("scene", scene);
+  out.key("version", std::string_view(version));
+  out.key("time", state.time, "[s]");
+  out.table("[modes]");
+  for (const auto& [body, n] : state.modes) out.key(toml(body), n);
+  out.table("[state]");
+  for (size_t i = 0; i < state.names.size(); ++i) out.key(toml(state.names[i]), state.y[static_cast<Index>(i)]);
+  out.table("[stops.largest_rate]");
+  for (const auto& [name, stop] : state.stops) out.key(toml(name), stop.largest_rate);
+  out.table("[stops.settled]");
+  for (const auto& [name, stop] : state.stops)
+    if (stop.settled >= 0) out.key(toml(name), stop.settled);
+  out.table("[loops]");
+  for (const auto& [joint, angle] : state.loops) out.key(toml(joint), angle);
+  return std::move(out).text();
+}
+
+struct SavedState::Content {
+  fs::path file;
+  Value root;
+  double time = 0;
+  std::map<std::string, int> modes;
+  std::map<std::string, StopHistory> stops;
+  std::map<std::string, double> loops;
+};
+
+namespace {
+
+double finite(TableReader& table, const std::string& name) {
+  const double value = table.number(name);
+  if (!std::isfinite(value)) table.fault(name, "must be a finite number");
+  return value;
+}
+
+/// All numbers of a table, by name.
+std::map<std::string, double> numbers_of(TableReader& table) {
+  std::map<std::string, double> numbers;
+  for (const auto& [name, value] : table.value().entries) numbers[name] = finite(table, name);
+  return numbers;
+}
+
+std::string first_few(const std::vector<std::string>& names) {
+  constexpr size_t few = 4;
+  std::string text;
+  for (size_t i = 0; i < std::min(few, names.size()); ++i) text += (i > 0 ? ", " : "") + names[i];
+  return names.size() > few ? text + fmt::format(" and {} more", names.size() - few) : text;
+}
+
+/// A state of another scene is one fault, not one for each number.
+void check_names(TableReader& table, const std::vector<std::string>& names) {
+  const std::set<std::string> wanted(names.begin(), names.end());
+  std::vector<std::string> missing, unknown;
+  for (const std::string& name : names)
+    if (!table.has(name)) missing.push_back(name);
+  for (const auto& [name, value] : table.value().entries)
+    if (!wanted.contains(name)) unknown.push_back(name);
+  if (missing.empty() && unknown.empty()) return;
+  const toml_reader::Place at = table.value().place;
+  std::string text =
+      fmt::format("{}:{}:{}: state: is of another scene, or of other numbers of modes", at.file, at.line, at.column);
+  if (!missing.empty()) text += "; not here: " + first_few(missing);
+  if (!unknown.empty()) text += "; not of this scene: " + first_few(unknown);
+  throw InputError(text);
+}
+
+std::map<std::string, double> numbers_of(TableReader& table, std::string_view key) {
+  std::optional<TableReader> below = table.table(key, true);
+  return below ? numbers_of(*below) : std::map<std::string, double>();
+}
+
+}  // namespace
+
+SavedState SavedState::read(const fs::path& path) {
+  std::error_code error;
+  auto content = std::make_unique<Content>();
+  content->file = fs::is_directory(path, error) ? path / "state.toml" : path;
+  const std::string file = content->file.string();
+  content->root = toml_reader::parse_format(toml_reader::read_text(file), file, state_format);
+  Faults faults;
+  TableReader table(content->root, "", faults);
+  read_format(table, state_format);
+  table.text("scene");
+  table.text("version");
+  content->time = table.number("time");
+  if (!(content->time >= 0 && std::isfinite(content->time))) table.fault("time", "must be a time after the start [s]");
+  if (std::optional<TableReader> modes = table.table("modes", true))
+    for (const auto& [body, value] : modes->value().entries) {
+      content->modes[body] = modes->integer(body);
+      if (content->modes[body] < 0) modes->fault(body, "must be a number of modes");
+    }
+  table.table("state", true);
+  if (std::optional<TableReader> stops = table.table("stops", true)) {
+    for (const auto& [name, rate] : numbers_of(*stops, "largest_rate")) content->stops[name].largest_rate = rate;
+    for (const auto& [name, time] : numbers_of(*stops, "settled")) content->stops[name].settled = time;
+    stops->reject_unknown();
+  }
+  content->loops = numbers_of(table, "loops");
+  table.reject_unknown();
+  faults.throw_if_any();
+  return SavedState(std::move(content));
+}
+
+SavedState::SavedState(std::unique_ptr<const Content> content) : content_(std::move(content)) {}
+SavedState::~SavedState() = default;
+SavedState::SavedState(SavedState&&) noexcept = default;
+
+const fs::path& SavedState::file() const { return content_->file; }
+double SavedState::time() const { return content_->time; }
+const std::map<std::string, int>& SavedState::modes() const { return content_->modes; }
+
+VectorXd SavedState::values(const std::vector<std::string>& names) const {
+  Faults faults;
+  TableReader root(content_->root, "", faults);
+  TableReader table = *root.table("state", true);
+  check_names(table, names);
+  VectorXd y(static_cast<Index>(names.size()));
+  for (size_t i = 0; i < names.size(); ++i) y[static_cast<Index>(i)] = finite(table, names[i]);
+  for (size_t i = 0; i < names.size(); ++i)
+    if (names[i].ends_with(".attitude.w") && !(std::abs(y.segment<4>(static_cast<Index>(i)).norm() - 1) < 1e-9))
+      table.fault(names[i], "begins a quaternion (w, x, y, z) that is not of length 1");
+  faults.throw_if_any();
+  return y;
+}
+
+std::vector<StopHistory> SavedState::stops(const std::vector<std::string>& names) const {
+  std::vector<StopHistory> histories;
+  for (const std::string& name : names) {
+    const auto found = content_->stops.find(name);
+    histories.push_back(found == content_->stops.end() ? StopHistory() : found->second);
+  }
+  return histories;
+}
+
+double SavedState::loop_angle(const std::string& joint, double otherwise) const {
+  const auto found = content_->loops.find(joint);
+  return found == content_->loops.end() ? otherwise : found->second;
+}
+
+}  // namespace flexboom

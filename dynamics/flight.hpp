@@ -1,0 +1,55 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+namespace flexboom {
+
+/// How a stop was met so far: what settling is judged by, and what a flight that goes on must know.
+struct StopHistory {
+  double largest_rate = 0;  // of its hinge or joint [rad/s] or [m/s]
+  double settled = -1;      // time after which it was no longer looked at [s], or -1
+};
+
+/// What every flight is asked for, whatever the coordinates and the method.
+struct FlightOptions {
+  double tolerance = 1e-6;    // relative error wanted in every output (max over time / max of the output)
+  double start = 0;           // [s]
+  double duration = 10;       // [s], the time at the end
+  double output_step = 0.01;  // [s]
+  /// A hinge whose rate at the stop falls below this fraction of its largest rate so far has settled: its crossings are
+  /// no longer located (its stop counts as open) until the rate doubles. Negative: tolerance / 100. Zero: never.
+  double settle = -1;
+  /// Per hinge of a System, per joint of other scenes: of a flight that this one goes on. Empty: none was met.
+  std::vector<StopHistory> stops{};
+  /// Times where forces or prescribed motions are not smooth, ascending [s]: a step ends there and the method starts
+  /// anew. Not of a System.
+  std::vector<double> corners{};
+  /// No step passes an output: what forces do for as long as that is not stepped over. Not of a System.
+  bool step_to_outputs = false;
+  long max_steps = 200'000'000;
+  const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
+  std::function<void(double time, double duration)> progress;  // called now and then
+};
+
+/// @throws InputError naming the option that makes no sense; `stops`: how many histories there may be.
+void check_options(const FlightOptions&, std::size_t stops);
+
+/// The histories that a flight of so many stops begins with.
+std::vector<StopHistory> stops_at_start(const FlightOptions&, std::size_t stops);
+
+/// Times of outputs: the start, the multiples of the step after it, the end exactly.
+class OutputTimes {
+ public:
+  explicit OutputTimes(const FlightOptions&);
+  /// The time that follows `count` outputs; infinite after the end.
+  double after(std::size_t count) const;
+
+ private:
+  double start_, step_, end_;
+  double before_;  // multiples of the step up to the start
+};
+
+}  // namespace flexboom

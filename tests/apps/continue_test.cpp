@@ -1,0 +1,161 @@
+// A run that goes on from where another one ended is the same run.
+
+#include "tests/apps/run_testing.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// The text as a file, read as a state.
+SavedState state_of(const std::string& text) {
+  const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "state.toml";
+  std::ofstream(file) << text;
+  return SavedState::read(file);
+}
+
+/// The scene until `end`, after `from` if there is one.
+RunResult fly(Scene scene, double end, const RunResult* from = nullptr) {
+  scene.duration = end;
+  if (from) scene.from = std::make_shared<SavedState>(state_of(to_toml(from->end, scene.name)));
+  return run_scene(scene, {});
+}
+
+/// Largest difference of a column at the times of `later`, by its largest value over the whole run.
+double difference(const RunResult& whole, const RunResult& later, const std::string& name) {
+  const VectorXd t = column(whole, "t"), t_later = column(later, "t");
+  const VectorXd a = column(whole, name), b = column(later, name);
+  double worst = 0;
+  Index compared = 0;
+  for (Index i = 0, k = 0; i < t.size(); ++i) {
+    while (k < t_later.size() && t_later[k] < t[i] * (1 - 1e-12)) ++k;
+    if (k == t_later.size() || std::abs(t_later[k] - t[i]) > 1e-12 * t[i]) continue;
+    worst = std::max(worst, std::abs(a[i] - b[k]));
+    ++compared;
+  }
+  EXPECT_GT(compared, 10) << name;
+  const double size = a.cwiseAbs().maxCoeff();
+  return size > 0 ? worst / size : worst;
+}
+
+void expect_same(const RunResult& whole, const RunResult& first, const RunResult& later, double outputs,
+                 double event_times) {
+  EXPECT_EQ(later.outputs.names, whole.outputs.names);
+  for (const std::string& name : whole.outputs.names) {
+    if (column(whole, name).cwiseAbs().maxCoeff() < 1e-15) continue;  // round-off of what is zero
+    EXPECT_LT(difference(whole, later, name), outputs) << name;
+  }
+  std::vector<Event> events = first.trajectory.events;
+  events.insert(events.end(), later.trajectory.events.begin(), later.trajectory.events.end());
+  ASSERT_EQ(events.size(), whole.trajectory.events.size());
+  for (size_t i = 0; i < events.size(); ++i) {
+    EXPECT_EQ(events[i].hinge, whole.trajectory.events[i].hinge) << i;
+    EXPECT_EQ(events[i].contact, whole.trajectory.events[i].contact) << i;
+    EXPECT_NEAR(events[i].time, whole.trajectory.events[i].time, event_times) << i;
+  }
+}
+
+class Continue : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Formulations, Continue, testing::Values("relative", "multipliers"),
+                         [](const auto& row) { return row.param; });
+
+// Ends between two outputs, in the middle of contacts.
+TEST_P(Continue, SportIsTheSameRunInTwoFlights) {
+  Scene scene = scene_named("sport");
+  scene.formulation = GetParam();
+  const bool relative = GetParam() == "relative";
+  scene.tolerance = relative ? 1e-9 : 1e-7;
+  const RunResult whole = fly(scene, 0.6), first = fly(scene, 0.2137), later = fly(scene, 0.6, &first);
+  EXPECT_GE(later.trajectory.events.size(), 10u);
+  EXPECT_EQ(later.trajectory.time.front(), 0.2137);
+  expect_same(whole, first, later, relative ? 1e-8 : 1e-5, relative ? 1e-9 : 1e-6);
+  EXPECT_LT(later.trajectory.summary.energy_balance, relative ? 1e-8 : 1e-5);
+}
+
+TEST_P(Continue, FlexibleBodiesOnJoints) {
+  Scene scene = scene_named("flexible-appendage");
+  scene.formulation = GetParam();
+  scene.tolerance = 1e-8;
+  const RunResult whole = fly(scene, 2), first = fly(scene, 1.03), later = fly(scene, 2, &first);
+  expect_same(whole, first, later, 1e-5, 0);
+}
+
+// With few digits, so that booms come to rest on their stops.
+TEST(ContinueScene, WhatHasSettledStaysSettled) {
+  Scene scene = scene_named("sport");
+  scene.tolerance = 1e-2;
+  const RunResult whole = fly(scene, 6), first = fly(scene, 4), later = fly(scene, 6, &first);
+  int settled = 0;
+  for (const StopHistory& stop : first.trajectory.summary.stops) settled += stop.settled >= 0;
+  EXPECT_GT(settled, 0);
+  EXPECT_EQ(first.trajectory.events.size() + later.trajectory.events.size(), whole.trajectory.events.size());
+  ASSERT_EQ(later.trajectory.summary.stops.size(), first.trajectory.summary.stops.size());
+  for (size_t i = 0; i < first.trajectory.summary.stops.size(); ++i)
+    EXPECT_GE(later.trajectory.summary.stops[i].largest_rate, first.trajectory.summary.stops[i].largest_rate);
+}
+
+// Turns are commanded from the start of the scene on, whenever a run begins.
+TEST(ContinueScene, WheelsKeepTurning) {
+  Scene scene = scene_named("sport-calibration");
+  scene.tolerance = 1e-8;
+  const RunResult whole = fly(scene, 4), first = fly(scene, 2.2), later = fly(scene, 4, &first);
+  expect_same(whole, first, later, 1e-5, 1e-5);
+}
+
+TEST(ContinueState, NamesEveryNumberOfAnotherScene) {
+  const RunResult first = fly(scene_named("sport"), 0.1);
+  Scene more = scene_named("sport");
+  for (BodyScene& b : more.bodies) b.modes = 3;
+  try {
+    fly(more, 1, &first);
+    FAIL();
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("state.toml:"), std::string::npos) << text;
+    EXPECT_NE(text.find("sip.q3"), std::string::npos) << text;
+  }
+}
+
+TEST(ContinueState, BadFilesAreRefusedWithTheirPlace) {
+  const RunResult first = fly(scene_named("sport"), 0.1);
+  const std::string good = to_toml(first.end, "sport");
+  const std::vector<std::string> names = first.end.names;
+  EXPECT_EQ(state_of(good).values(names), first.end.y);  // bit for bit
+  EXPECT_EQ(state_of(good).time(), 0.1);
+  const auto replaced = [&good](const std::string& key, const std::string& value) {
+    const size_t at = good.find(key + " = "), end = good.find('\n', at);
+    return good.substr(0, at) + key + " = " + value + good.substr(end);
+  };
+  const std::pair<std::string, const char*> cases[] = {
+      {replaced("format", "\"flexboom-scene-1\""), "state.toml:1:"},
+      {replaced("time", "-1.0"), "time: "},
+      {replaced("time", "\"late\""), "time: "},
+      {replaced("\"sip.gap\"", "nan"), "must be a finite number"},
+      {replaced("\"sip.gap\"", "true"), "sip.gap"},
+      {replaced("\"sip.gap\"", "0.1\n\"sip.gab\" = 1.0"), "not of this scene: sip.gab"},
+      {replaced("\"hub.attitude.w\"", "0.5"), "not of length 1"},
+      {good.substr(0, good.find("[state]")), "state"},
+      {good.substr(0, good.size() / 2), "state.toml:"},
+      {"", "the file is empty"},
+  };
+  for (const auto& [text, words] : cases) {
+    try {
+      state_of(text).values(names);
+      FAIL() << words;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace flexboom
