@@ -74,6 +74,7 @@ struct ReduceArguments {
   std::optional<std::string> select;   // "list:1,3", "band:0,500", "mass:0.9", "completeness:0.9", "output:tip.uy,0.01"
   std::optional<std::string> damping;  // "modal:0.005", "loss-factor:0.01", "rayleigh:ALPHA,BETA", "none"
   bool stiffening = true;
+  std::vector<std::string> loads_at;  // node sets; empty: every marker that moves
 };
 
 struct ExportArguments {

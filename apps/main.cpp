@@ -132,6 +132,7 @@ struct CommandLine {
     c->add_option("--damping", reduce.damping,
                   "none, modal:ZETA, loss-factor:ETA or rayleigh:ALPHA,BETA (default: the file's)");
     c->add_flag("!--no-stiffening", reduce.stiffening, "Leave geometric stiffness out");
+    c->add_option("--loads-at", reduce.loads_at, "Node sets where loads stiffen the body; all that move by default");
     add_model_options(c, reduce.options);
     c->callback([this] { action = [this] { return reduce_command(reduce, common); }; });
   }

@@ -21,6 +21,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <utility>
 
 namespace flexboom {
@@ -68,6 +69,8 @@ void check_options(const ReduceArguments& a) {
   require(a.basis != "hinge" || !a.hinge_stiffness.empty(),
           "--basis hinge: give the stiffness of the hinge with --hinge-stiffness K1,K2 [N m/rad]");
   require(a.basis != "mean-axis" || !a.options.clamp, "--clamp: a body under mean axes is not held anywhere");
+  require(a.stiffening || a.loads_at.empty(), "--loads-at: loads stiffen nothing with --no-stiffening");
+  require(std::set(a.loads_at.begin(), a.loads_at.end()).size() == a.loads_at.size(), "--loads-at: a set comes twice");
   require(!a.count || *a.count >= 0, fmt::format("--count: must not be negative, got {}", a.count.value_or(0)));
 }
 
@@ -174,16 +177,22 @@ std::string options_text(const ReduceArguments& a, const EigenOptions& options) 
   if (a.select) text += ", select " + *a.select;
   if (a.damping) text += ", damping " + *a.damping;
   if (!a.stiffening) text += ", no stiffening";
+  if (!a.loads_at.empty()) text += fmt::format(", loads at {}", fmt::join(a.loads_at, " "));
   return text;
 }
 
-/// Node sets that the body keeps as markers and where loads act for geometric stiffness.
-std::vector<std::string> loaded_markers(const ReducedBody& body, const Mesh& mesh) {
+/// Node sets that the body keeps as markers and where loads act for geometric stiffness: all that move, or those asked
+/// for.
+std::vector<std::string> loaded_markers(const ReducedBody& body, const Mesh& mesh,
+                                        const std::vector<std::string>& asked) {
   std::vector<std::string> names;
   for (const Marker& marker : body.markers) {
     if (mesh.node_sets.contains(marker.name) && marker.S.norm() > 0) names.push_back(marker.name);
   }
-  return names;
+  for (const std::string& name : asked)
+    require(std::ranges::find(names, name) != names.end(),
+            fmt::format("--loads-at: '{}' is no node set that moves; there are {}", name, fmt::join(names, ", ")));
+  return asked.empty() ? names : asked;
 }
 
 }  // namespace
@@ -200,6 +209,7 @@ DampingRule parse_damping(const std::string& text) {
 
 ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int threads, ReductionSeconds& seconds) {
   check_options(a);
+  for (const std::string& name : a.loads_at) node_set(model.mesh, name);  // before the long work
   Stopwatch clock;
   const DampingRule damping = a.damping ? parse_damping(*a.damping) : model.damping;
   const Assembled m = assembled(model, a, threads);
@@ -233,9 +243,11 @@ ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int thread
     statics = static_solver(unknowns(model.mesh, m.assembly.dofs, held).reduced(m.assembly.K), basis);
   const StaticSolver* held_statics = statics ? &*statics : nullptr;
   if (a.stiffening && flies && body.n() > 0) {
-    body.Kg = geometric_stiffness(
-        model.mesh, m.assembly, held, basis.Phi,
-        {.markers = loaded_markers(body, model.mesh), .threads = threads, .statics = held_statics, .Ke = &body.Ke});
+    body.Kg = geometric_stiffness(model.mesh, m.assembly, held, basis.Phi,
+                                  {.markers = loaded_markers(body, model.mesh, a.loads_at),
+                                   .threads = threads,
+                                   .statics = held_statics,
+                                   .Ke = &body.Ke});
   }
   seconds.stiffening += clock.lap();
   apply_damping(body, damping);

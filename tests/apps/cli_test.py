@@ -927,6 +927,17 @@ class Reduce(Case):
         self.assertEqual(seen["coordinates"], document["coordinates"])
         self.assertEqual(seen["provenance"]["options"], "basis clamped, count 6")
 
+    def test_loads_stiffen_where_asked(self):
+        every = flexboom("inspect", self.reduce("--count", "2")[0]).stdout
+        body, _ = self.reduce("--count", "2", "--loads-at", "tip")
+        self.assertIn("geometric stiffness: spin, acceleration, 1 marker(s)", flexboom("inspect", body).stdout)
+        self.assertNotIn("geometric stiffness: spin, acceleration, 0 marker(s)", every)
+        self.assertIn("loads at tip", flexboom("inspect", body, "--json").stdout)
+        body.unlink()
+        self.refused("--loads-at", "tap", words="tip")
+        self.refused("--loads-at", "root", words="no node set that moves")
+        self.refused("--loads-at", "tip", "--no-stiffening", words="--no-stiffening")
+
     def test_same_file_again(self):
         first = self.reduce("--count", "4")[0].read_bytes()
         self.assertEqual(self.reduce("--count", "4")[0].read_bytes(), first)
