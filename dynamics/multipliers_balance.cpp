@@ -1,5 +1,7 @@
 #include "dynamics/multipliers_balance.hpp"
 
+#include "dynamics/multipliers_scales.hpp"
+
 #include "dynamics/rotation.hpp"
 #include "reduction/root_loads.hpp"
 
@@ -67,7 +69,7 @@ void set_drifts(const Multibody& scene, MultibodyTrajectory& r) {
     P = std::max(P, b.momentum_scale);
     H = std::max(H, b.angular_momentum_scale);
   }
-  s.energy_balance = energy > 0 ? gap / energy : 0;
+  s.energy_balance = energy > nothing * slow_energy(scene) ? gap / energy : 0;
   if (is_isolated(scene)) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
 }
 

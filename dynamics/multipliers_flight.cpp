@@ -292,12 +292,12 @@ class MultipliersFlight final : public DaeProblem {
         memory_.closed[joint] = !closed;
         result_.events.push_back({t_, static_cast<int>(joint), !closed, g.rate});
         changed = true;
-        if (std::abs(g.rate) < settle_ * largest && !pushed(i)) {
+        if (std::abs(g.rate) * period(i) < small(i) && !pushed(i)) {
           history_[joint].settled = t_;
           armed_[i] = 0;
           memory_.closed[joint] = 0;
         }
-      } else if (!armed_[i] && std::abs(g.rate) > 2 * settle_ * largest) {
+      } else if (!armed_[i] && (std::abs(g.rate) * period(i) > 2 * small(i) || g.value > 2 * small(i))) {
         history_[joint].settled = -1;
         armed_[i] = 1;
         memory_.closed[joint] = g.value > 0;
@@ -307,15 +307,25 @@ class MultipliersFlight final : public DaeProblem {
     return changed;
   }
 
+  /// Time scale of a joint on its stop [s].
+  double period(size_t i) const {
+    const Joint& joint = scene_.joints[stops_[i]];
+    const ReducedBody& body = scene_.bodies[static_cast<size_t>(std::max(joint.b.body, 0))];
+    const double inertia = joint.kind == JointKind::hinge ? body.J0.trace() / 3 : body.m;
+    return std::sqrt(inertia / (joint.mechanism.stiffness + joint.mechanism.stop_stiffness));
+  }
+
+  /// Size of motions about the stop that are not followed: those the scene does not ask for, and round-off of the gap.
+  double small(size_t i) const {
+    constexpr double round_off = 1e-14;
+    return std::max(settle_ * history_[stops_[i]].largest_rate * period(i), round_off);
+  }
+
   /// Does something push a joint that is on its stop, so that it will not stay there?
   bool pushed(size_t i) {
     VectorXd y = y_;
     equations_.make_consistent(t_, y, y_dot_, memory_);
-    const Joint& joint = scene_.joints[stops_[i]];
-    const ReducedBody& body = scene_.bodies[static_cast<size_t>(std::max(joint.b.body, 0))];
-    const double inertia = joint.kind == JointKind::hinge ? body.J0.trace() / 3 : body.m;
-    const double period = std::sqrt(inertia / (joint.mechanism.stiffness + joint.mechanism.stop_stiffness));
-    return std::abs(rate_of_rate(i, y)) * period > 2 * settle_ * history_[stops_[i]].largest_rate;
+    return std::abs(rate_of_rate(i, y)) * period(i) * period(i) > 2 * small(i);
   }
 
   void write_outputs() {

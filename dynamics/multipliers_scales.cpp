@@ -13,16 +13,27 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// What a start says of the energies to come: its own; where nothing moves or pushes yet, that of bodies going a
-/// hundredth of their size per second.
-double energy_scale(const Multibody& scene, double at_start, const VectorXd& y_dot) {
-  if (at_start > 0 || !y_dot.isZero(0)) return std::max(at_start, 1e-30);
+/// What a start says of the energies to come: its own; where nothing moves or pushes yet but round-off, that of slow
+/// bodies. `time`: in which a push shows [s].
+double energy_scale(const Equations& equations, double at_start, const VectorXd& y_dot, double time) {
+  const double slow = slow_energy(equations.scene());
+  double begun = at_start;
+  for (size_t i = 0; i < equations.places().size(); ++i) {
+    const BodyPlaces& at = equations.places()[i];
+    const ReducedBody& b = equations.scene().bodies[i];
+    begun += (b.m * y_dot.segment<3>(at.v).squaredNorm() + b.J0.trace() / 3 * y_dot.segment<3>(at.w).squaredNorm()) *
+             time * time / 2;
+  }
+  return begun > nothing * slow ? std::max(at_start, 1e-30) : slow;
+}
+
+}  // namespace
+
+double slow_energy(const Multibody& scene) {
   double E = 0;
   for (const ReducedBody& b : scene.bodies) E += 0.5e-4 * b.J0.trace();
   return E;
 }
-
-}  // namespace
 
 StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorXd& y0_dot, double energy,
                          double tolerance, double duration)
@@ -30,7 +41,7 @@ StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorX
   constexpr double part = 1e-3, round_off = 4e-15;
   scale_ = VectorXd::Constant(y0.size(), 1e100);
   least_ = VectorXd::Zero(y0.size());
-  const double time = std::min(1.0, 0.01 * duration), E = energy_scale(equations.scene(), energy, y0_dot);
+  const double time = std::min(1.0, 0.01 * duration), E = energy_scale(equations, energy, y0_dot, time);
   const auto& places = equations.places();
   double length = 0;  // [m]: positions are known to round-off of this
   for (const BodyPlaces& at : places) length = std::max(length, y0.segment<3>(at.R).norm());
