@@ -181,7 +181,14 @@ ModalBasis ritz_modes(const Mesh& mesh, const Assembly& assembly, const Clamp& c
 
 ModalBasis clamped_modes(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const EigenOptions& options,
                          int threads) {
-  return modes_of(ModalModel(mesh, assembly, clamp), clamp, Reduced(mesh, assembly, clamp), options, threads);
+  Reduced reduced(mesh, assembly, clamp);
+  ModalBasis basis = modes_of(ModalModel(mesh, assembly, clamp), clamp, reduced, options, threads);
+  if (basis.factor) {
+    const auto K = std::make_shared<SparseMatrix>();
+    K->swap(reduced.K);
+    basis.K = K;
+  }
+  return basis;
 }
 
 ModalBasis clamped_modes_releasing(const Mesh& mesh, Assembly& assembly, const Clamp& clamp,

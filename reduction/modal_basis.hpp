@@ -26,6 +26,7 @@ struct ModalBasis {
   std::vector<Coordinate> coordinates;  // one per shape
   std::vector<Interface> interfaces;
   std::shared_ptr<const SparseFactor> factor{};  // of K over the unknowns, with EigenOptions::keep_factor; may be null
+  std::shared_ptr<const SparseMatrix> K{};       // that K, where there is the factor
   std::vector<int> interface_nodes;              // the node that carries each; -1: the mean of the node set of its name
 };
 

@@ -54,23 +54,27 @@ std::shared_ptr<const SparseFactor> factorised(const SparseMatrix& K) {
 }  // namespace
 
 StaticSolver::StaticSolver(const SparseMatrix& K, const std::vector<int>& held)
-    : count_(K.cols()),
-      held_(held),
-      left_(others(K.cols(), held)),
-      K_(parts(K, held_, left_)),
-      factor_(factorised(K_.first)) {}
+    : count_(K.cols()), held_(held), left_(others(K.cols(), held)) {
+  auto [among, to_held] = parts(K, held_, left_);
+  K_held_.swap(to_held);
+  const auto own = std::make_shared<SparseMatrix>();
+  own->swap(among);
+  factor_ = factorised(*own);
+  K_ = own;
+}
 
-StaticSolver::StaticSolver(std::shared_ptr<const SparseFactor> factor, SparseMatrix K)
-    : count_(K.cols()),
-      left_(others(K.cols(), {})),
-      K_(std::move(K), SparseMatrix(count_, 0)),
+StaticSolver::StaticSolver(std::shared_ptr<const SparseFactor> factor, std::shared_ptr<const SparseMatrix> K)
+    : count_(K->cols()),
+      left_(others(K->cols(), {})),
+      K_(std::move(K)),
+      K_held_(count_, 0),
       factor_(std::move(factor)) {}
 
 MatrixXd StaticSolver::solve(const MatrixXd& f) const {
   MatrixXd x(f.rows(), f.cols());
   factor_->solve(f, x);
   // One correction by what is left of the load: the factor of a slender body loses digits that K still has.
-  const MatrixXd left_over = f - symmetric_product(K_.first, x);
+  const MatrixXd left_over = f - symmetric_product(*K_, x);
   MatrixXd correction(f.rows(), f.cols());
   factor_->solve(left_over, correction);
   return x + correction;
@@ -79,7 +83,7 @@ MatrixXd StaticSolver::solve(const MatrixXd& f) const {
 MatrixXd StaticSolver::displaced(const MatrixXd& values) const {
   MatrixXd x(count_, values.cols());
   x(held_, Eigen::all) = values;
-  x(left_, Eigen::all) = solve(-(K_.second * values));
+  x(left_, Eigen::all) = solve(-(K_held_ * values));
   return x;
 }
 
@@ -95,7 +99,7 @@ std::pair<MatrixXd, MatrixXd> StaticSolver::loaded_once(const MatrixXd& f) const
   factor_->solve(f_left, x_left);
   std::pair<MatrixXd, MatrixXd> result{MatrixXd::Zero(count_, f.cols()), MatrixXd::Zero(count_, f.cols())};
   result.first(left_, Eigen::all) = x_left;
-  result.second(left_, Eigen::all) = f_left - symmetric_product(K_.first, x_left);
+  result.second(left_, Eigen::all) = f_left - symmetric_product(*K_, x_left);
   return result;
 }
 

@@ -16,8 +16,8 @@ class StaticSolver {
   /// K: lower triangle. @throws NumericalError when the held unknowns leave a motion without stiffness.
   StaticSolver(const SparseMatrix& K, const std::vector<int>& held);
 
-  /// Nothing held, by the factor of K that the caller has (ModalBasis::factor).
-  StaticSolver(std::shared_ptr<const SparseFactor>, SparseMatrix K);
+  /// Nothing held, by the factor of K that the caller has (ModalBasis::factor and K): nothing is copied.
+  StaticSolver(std::shared_ptr<const SparseFactor>, std::shared_ptr<const SparseMatrix> K);
 
   /// x with the held unknowns at the given values and no load on the others: a column per column of `values`.
   Eigen::MatrixXd displaced(const Eigen::MatrixXd& values) const;
@@ -34,7 +34,8 @@ class StaticSolver {
 
   Eigen::Index count_ = 0;
   std::vector<int> held_, left_;
-  std::pair<SparseMatrix, SparseMatrix> K_;  // K_ii (lower triangle) and K_ib; i: left, b: held
+  std::shared_ptr<const SparseMatrix> K_;  // of those left, lower triangle
+  SparseMatrix K_held_;                    // left x held
   std::shared_ptr<const SparseFactor> factor_;
 };
 
