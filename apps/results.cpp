@@ -55,10 +55,9 @@ namespace {
 
 /// Names that the events of a run number: bodies on hinges of the hub, or joints.
 std::vector<std::string> hinge_names(const RunResult& r) {
+  if (r.scene.is_tree) return joint_names(r.scene);
   std::vector<std::string> names;
-  for (const JointScene& j : r.scene.joints) names.push_back(j.name);
-  for (const PreparedBody& p : r.bodies)
-    if (!r.scene.is_tree) names.push_back(p.body.name);
+  for (const PreparedBody& p : r.bodies) names.push_back(p.body.name);
   return names;
 }
 

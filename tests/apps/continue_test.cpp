@@ -5,8 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <string>
 #include <utility>
 
@@ -16,18 +14,10 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// The text as a file, read as a state.
-SavedState state_of(const std::string& text) {
-  const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "state.toml";
-  std::ofstream(file) << text;
-  return SavedState::read(file);
-}
-
 /// The scene until `end`, after `from` if there is one.
 RunResult fly(Scene scene, double end, const RunResult* from = nullptr) {
   scene.duration = end;
-  if (from) scene.from = std::make_shared<SavedState>(state_of(to_toml(from->end, scene.name)));
-  return run_scene(scene, {});
+  return run_scene(from ? going_on(std::move(scene), *from) : scene, {});
 }
 
 /// Largest difference of a column at the times of `later`, by its largest value over the whole run.

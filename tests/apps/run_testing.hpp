@@ -5,8 +5,14 @@
 #include "apps/simulate.hpp"
 #include "fem/check.hpp"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <memory>
 #include <string>
+#include <utility>
 
 namespace flexboom {
 
@@ -14,6 +20,19 @@ namespace flexboom {
 inline Scene scene_named(const std::string& name) {
   Scene scene = load_scene(name);
   scene.error_budget = false;
+  return scene;
+}
+
+/// The text as a file, read as a state.
+inline SavedState state_of(const std::string& text) {
+  const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "state.toml";
+  std::ofstream(file) << text;
+  return SavedState::read(file);
+}
+
+/// The scene from where a run ended.
+inline Scene going_on(Scene scene, const RunResult& from) {
+  scene.from = std::make_shared<SavedState>(state_of(to_toml(from.end, scene.name)));
   return scene;
 }
 
