@@ -55,7 +55,7 @@ std::vector<std::string> methods_of(const Scene& scene) {
             fmt::format("scene {} closes a loop: one method flies it, there is nothing to compare", scene.name));
   std::vector<std::string> names;
   for (const IntegratorMethod& m : integrator_methods())
-    if (!scene.is_tree || m.name != IntegratorOptions{}.method) names.emplace_back(m.name);
+    if (!scene.is_tree || m.make != nullptr) names.emplace_back(m.name);
   names.emplace_back(by_multipliers);
   return names;
 }

@@ -1,5 +1,6 @@
 #include "dynamics/integrator.hpp"
 
+#include "dynamics/arkode.hpp"
 #include "dynamics/cvode.hpp"
 #include "dynamics/exponential.hpp"
 #include "dynamics/rotation.hpp"
@@ -20,19 +21,13 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr std::array<IntegratorMethod, 3> methods = {{
-    {"exponential", "exact in the linear part, collocation of order 8 in the rest", 0.1, make_exponential},
+constexpr std::array<IntegratorMethod, 5> methods = {{
+    {"exponential", "exact in the linear part, collocation of order 8 in the rest", 0.1, nullptr, make_exponential},
     {"bdf", "CVODE backward differentiation, order 1-5, Newton with the exact Jacobian", 0.005, make_cvode_bdf},
     {"adams", "CVODE Adams-Moulton, order 1-12, Newton with the exact Jacobian", 0.001, make_cvode_adams},
+    {"dirk", "ARKODE implicit Runge-Kutta, order 5, Newton with the exact Jacobian", 0.005, make_arkode_implicit},
+    {"erk", "ARKODE explicit Runge-Kutta, order 6", 0.01, make_arkode_explicit},
 }};
-
-const IntegratorMethod& method_named(const std::string& name) {
-  for (const IntegratorMethod& m : methods)
-    if (m.name == name) return m;
-  std::string known;
-  for (const IntegratorMethod& m : methods) known += fmt::format(" '{}'", m.name);
-  throw InputError(fmt::format("integrator '{}' is not known; there are:{}", name, known));
-}
 
 /// Sizes that each state's error is measured against: the largest value so far of the group it belongs to, and never
 /// less than a small part of what the energy at the start could make of it (so that a state that starts at zero has a
@@ -169,7 +164,8 @@ class Flight {
         options_(options),
         settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
         scales_(system, y0, method.local_share * options.tolerance, options.rescale_at_events),
-        stepper_(method.make(system, scales_.error())),
+        stepper_(method.make_of_system ? method.make_of_system(system, scales_.error())
+                                       : method.make(ode_of(system), scales_.error())),
         contacts_(contacts_at_start(system, y0, options)),
         outputs_(options),
         t_(options.start),
@@ -349,11 +345,22 @@ class Flight {
 
 std::span<const IntegratorMethod> integrator_methods() { return methods; }
 
+const IntegratorMethod& integrator_method(const std::string& name, MethodFor wanted) {
+  std::string known;
+  for (const IntegratorMethod& m : methods) {
+    if (wanted == MethodFor::any && m.make == nullptr) continue;
+    if (m.name == name) return m;
+    known += fmt::format(" '{}'", m.name);
+  }
+  throw InputError(fmt::format("integrator '{}' is not known{}; there are:{}", name,
+                               wanted == MethodFor::any ? " for trees" : "", known));
+}
+
 Trajectory integrate(const System& system, const VectorXd& y0, const IntegratorOptions& options) {
   check_options(options, system.appendages().size());
   require(y0.size() == system.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   if (system.field()) system.field()->orbit.at(options.duration);  // does it last so long?
-  return Flight(system, y0, options, method_named(options.method)).fly();
+  return Flight(system, y0, options, integrator_method(options.method, MethodFor::system)).fly();
 }
 
 }  // namespace flexboom

@@ -13,6 +13,8 @@
 
 namespace flexboom {
 
+class Ode;
+
 struct IntegratorOptions : FlightOptions {
   std::string method = "exponential";
   /// Measure the hinge's error against its motion since the last event instead of its largest motion: late, tiny
@@ -91,10 +93,19 @@ struct IntegratorMethod {
   /// Part of the tolerance wanted over a whole run that each step is asked for. Errors of undamped motion grow with its
   /// periods, so this is a start, not a promise: a run's error budget measures what was reached.
   double local_share;
-  std::unique_ptr<Stepper> (*make)(const System&, const ErrorScale&);
+  /// Of any system.
+  std::unique_ptr<Stepper> (*make)(std::unique_ptr<Ode>, const ErrorScale&);
+  /// Of a System, where the method needs its structure; else null.
+  std::unique_ptr<Stepper> (*make_of_system)(const System&, const ErrorScale&) = nullptr;
 };
 
-/// The table of methods: "exponential", "bdf", "adams".
+/// The table of methods: "exponential", "bdf", "adams", "dirk", "erk".
 std::span<const IntegratorMethod> integrator_methods();
+
+enum class MethodFor { system, any };
+
+/// @throws InputError for a name that is not in the table, or not for any system where that is asked, listing those
+/// that are.
+const IntegratorMethod& integrator_method(const std::string& name, MethodFor);
 
 }  // namespace flexboom

@@ -14,6 +14,7 @@ class OdeOfSystem final : public Ode {
  public:
   explicit OdeOfSystem(const System& system) : system_(system), work_(system.workspace()) {}
 
+  std::unique_ptr<Ode> another() const override { return ode_of(system_); }
   int size() const override { return system_.layout().size; }
   int stops() const override { return static_cast<int>(system_.appendages().size()); }
   void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) override {
@@ -37,6 +38,7 @@ class OdeOfTree final : public Ode {
   explicit OdeOfTree(const Tree& tree)
       : tree_(tree), work_(tree.workspace()), contact_(tree.scene().joints.size(), 0), x_(tree.layout().size) {}
 
+  std::unique_ptr<Ode> another() const override { return ode_of(tree_); }
   int size() const override { return tree_.layout().size; }
   int stops() const override { return static_cast<int>(tree_.stops().size()); }
   void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) override {

@@ -13,6 +13,8 @@ namespace flexboom {
 class Ode {
  public:
   virtual ~Ode() = default;
+  /// The same equations with a workspace of its own.
+  virtual std::unique_ptr<Ode> another() const = 0;
   virtual int size() const = 0;
   virtual int stops() const = 0;
   /// contact: one flag per stop.

@@ -1,6 +1,6 @@
 #include "dynamics/tree_integrator.hpp"
 
-#include "dynamics/cvode.hpp"
+#include "dynamics/ode.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
 
@@ -73,24 +73,14 @@ class TreeScales {
   ErrorScale error_;
 };
 
-struct Method {
-  std::string_view name;
-  double local_share;  // as in the table of integrators
-  std::unique_ptr<Stepper> (*make)(std::unique_ptr<Ode>, const ErrorScale&);
-};
-constexpr Method methods[] = {{"adams", 0.001, make_cvode_adams}, {"bdf", 0.005, make_cvode_bdf}};
-
-const Method& method_named(const std::string& name) {
-  for (const Method& m : methods)
-    if (m.name == name) return m;
-  if (name == IntegratorOptions{}.method) return methods[0];
-  throw InputError(fmt::format("integrator '{}' is not known for trees; there are: 'adams' 'bdf'", name));
+const IntegratorMethod& method_of(const IntegratorOptions& options) {
+  return integrator_method(options.method == IntegratorOptions{}.method ? "adams" : options.method, MethodFor::any);
 }
 
 /// One run: the event loop around a method.
 class TreeFlight {
  public:
-  TreeFlight(const Tree& tree, const VectorXd& y0, const IntegratorOptions& options, const Method& method)
+  TreeFlight(const Tree& tree, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method)
       : tree_(tree),
         options_(options),
         settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
@@ -325,7 +315,7 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   require(y0.size() == tree.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   VectorXd start = y0;
   tree.impose(o.start, start);
-  return TreeFlight(tree, start, o, method_named(o.method)).fly();
+  return TreeFlight(tree, start, o, method_of(o)).fly();
 }
 
 std::vector<Stiffening> stiffening_where_it_counts(const Multibody& scene, const TreeState& state, double duration,

@@ -217,6 +217,7 @@ void TenSeconds(benchmark::State& state, const char* method) {
 }
 BENCHMARK_CAPTURE(TenSeconds, exponential, "exponential")->DenseRange(2, 9, 1)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(TenSeconds, bdf, "bdf")->DenseRange(3, 9, 2)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(TenSeconds, dirk, "dirk")->DenseRange(3, 9, 2)->Unit(benchmark::kMillisecond);
 
 /// The same with more modes: the fastest eigenvalue grows from 5e4 to 2e7 1/s.
 void MoreModes(benchmark::State& state) {

@@ -808,7 +808,7 @@ class Bench(Case):
         result = flexboom("bench", "transient", scene, "--longest", "0.001", "--json", "--out", out)
         self.assert_exit(OK, result)
         rows = json.loads(result.stdout)
-        self.assertEqual({row["method"] for row in rows}, {"exponential", "bdf", "adams", "ida"})
+        self.assertEqual({row["method"] for row in rows}, {"exponential", "bdf", "adams", "dirk", "erk", "ida"})
         for row in rows:
             self.assertLess(row["error"], 0.2, row)  # of a coarse tolerance, just after a contact
             self.assertLess(row["hub_error"], 0.01, row)
@@ -819,7 +819,7 @@ class Bench(Case):
         result = flexboom("bench", "transient", "two-link-arm", "--longest", "0.001", "--json", "--out", self.folder)
         self.assert_exit(OK, result)
         rows = json.loads(result.stdout)
-        self.assertEqual({row["method"] for row in rows}, {"bdf", "adams", "ida"})
+        self.assertEqual({row["method"] for row in rows}, {"bdf", "adams", "dirk", "erk", "ida"})
         for row in rows:
             self.assertLess(row["error"], 0.2, row)
 

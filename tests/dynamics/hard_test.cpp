@@ -27,7 +27,8 @@ class Hard : public ::testing::TestWithParam<std::string> {
     return o;
   }
 };
-INSTANTIATE_TEST_SUITE_P(Methods, Hard, ::testing::Values("exponential", "bdf"), [](const auto& p) { return p.param; });
+INSTANTIATE_TEST_SUITE_P(Methods, Hard, ::testing::Values("exponential", "bdf", "dirk"),
+                         [](const auto& p) { return p.param; });
 
 /// A rigid boom about its hinge, J Delta'' + c Delta' + k Delta = 0 with a stop at Delta = 0.
 struct Pendulum {
@@ -60,11 +61,15 @@ TEST_P(Hard, AStopAMillionTimesAsStiff) {
   const std::vector<double> exact = p.crossings(12);
   ASSERT_GE(r.events.size(), exact.size());
   for (size_t i = 0; i < exact.size(); ++i)
-    EXPECT_NEAR(r.events[i].time, exact[i], GetParam() == "bdf" ? 1e-6 : 1e-9) << i;
+    EXPECT_NEAR(r.events[i].time, exact[i],
+                GetParam() == "exponential" ? 1e-9
+                : GetParam() == "dirk"      ? 1e-8
+                                            : 1e-6)
+        << i;
 }
 
 TEST_P(Hard, TenThousandContactsWithoutDamping) {
-  if (GetParam() == "bdf") GTEST_SKIP() << "loses energy; 40 times slower";
+  if (GetParam() != "exponential") GTEST_SKIP() << "loses energy; 40 times slower";
   Pendulum p;
   p.c = 0;
   const System system = p.system();
@@ -181,7 +186,7 @@ TEST_P(Hard, AMillionSeconds) {
 
 // Two turns a second for days about a principal axis.
 TEST_P(Hard, AMillionTurns) {
-  if (GetParam() == "bdf") GTEST_SKIP() << "1e8 steps";
+  if (GetParam() != "exponential") GTEST_SKIP() << "1e8 steps";
   const System system(rigid_body("hub", 8.5, Vector3d::Zero(), Vector3d(0.13, 0.1, 0.06).asDiagonal()), {});
   State s = system.at_rest({});
   s.omega = Vector3d(4 * pi, 0, 0);

@@ -106,6 +106,25 @@ TEST_P(EveryMethod, FlexibleBoomOnAFixedHubMeetsTheReference) {
 }
 
 /// Free, undamped, no stop: Delta = Delta_0 cos(omega t).
+// Steps of minutes: nothing about a stop is measured in seconds.
+TEST_P(EveryMethod, SlowSwingBesideAStop) {
+  Appendage a = boom_2(0).appendages()[0];
+  const double rate = 2 * pi / 3600, J = a.body.J0(2, 2);
+  a.hinge.mechanism = {J * rate * rate, pi / 2 - 0.1, 0, 10.0, pi / 2};
+  const System system(ReducedBody{}, {a}, true);
+  IntegratorOptions o;
+  o.method = GetParam();
+  o.duration = 7200;
+  o.output_step = 100;
+  const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 - 0.15})), o);
+  EXPECT_TRUE(r.events.empty());
+  EXPECT_LT(r.summary.steps, 3000);
+  double error = 0;
+  for (size_t i = 0; i < r.time.size(); ++i)
+    error = std::max(error, std::abs(system.gap(r.y[i].data(), 0) + 0.1 + 0.05 * std::cos(rate * r.time[i])));
+  EXPECT_LT(error, 1e-6);  // ten times the tolerance
+}
+
 TEST_P(EveryMethod, ErrorOfAnOscillatorFollowsTheTolerance) {
   const System damped = boom_2(0);
   Appendage a = damped.appendages()[0];

@@ -74,7 +74,7 @@ IntegratorOptions options(const std::string& method, double tolerance, double du
 }
 
 class EveryMethodInOrbit : public ::testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(Table, EveryMethodInOrbit, ::testing::Values("exponential", "bdf", "adams"),
+INSTANTIATE_TEST_SUITE_P(Table, EveryMethodInOrbit, ::testing::Values("exponential", "bdf", "adams", "dirk", "erk"),
                          [](const auto& p) { return p.param; });
 
 /// A rigid body on a circle swings in pitch: theta'' = -3 n^2 (Ixx - Izz)/Iyy sin theta cos theta, a pendulum whose

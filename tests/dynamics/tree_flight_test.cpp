@@ -69,7 +69,7 @@ Multibody two_link_arm(double gravity) {
 }
 
 TEST(TreeFlight, FlexibleArmKeepsItsEnergy) {
-  for (const char* method : {"adams", "bdf"}) {
+  for (const char* method : {"adams", "bdf", "dirk"}) {
     const Tree tree(two_link_arm(9.81));
     TreeState s = tree.at_rest();
     s.joints[0].coordinate = {0.3};
