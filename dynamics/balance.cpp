@@ -7,6 +7,7 @@
 namespace flexboom {
 
 using Eigen::Matrix3d;
+using Eigen::Ref;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
@@ -23,9 +24,10 @@ struct Totals {
   double m = 0;
   Vector3d first_moment = Vector3d::Zero();
 
-  /// `motion` in the axes of the body, A: these -> inertial, R: its BRF origin.
-  void add(const ReducedBody& b, const BodyMotion& motion, const Matrix3d& A, const Vector3d& R) {
-    const BodyMomenta of_body = momenta(b, motion);
+  /// v, w in the axes of the body, A: these -> inertial, R: its BRF origin.
+  void add(const ReducedBody& b, const Vector3d& v, const Vector3d& w, const Ref<const VectorXd>& q,
+           const Ref<const VectorXd>& q_dot, const Matrix3d& A, const Vector3d& R) {
+    const BodyMomenta of_body = momenta(b, v, w, q, q_dot);
     const Vector3d P = A * of_body.linear;
     const Vector3d H = A * of_body.angular;
     balance.kinetic += of_body.kinetic;
@@ -35,25 +37,36 @@ struct Totals {
     balance.angular_momentum_scale += H.norm();
     m += b.m;
     first_moment += b.m * R + A * b.mc0;
-    if (b.n() > 0) first_moment += A * (b.Ct * motion.q);
+    if (b.n() > 0) first_moment += A * Vector3d(b.Ct.lazyProduct(q));
   }
 };
 
 }  // namespace
 
 Balance System::balance(const Eigen::Ref<const VectorXd>& y) const {
-  const State s = unpack(y);
-  const Matrix3d A = fixed_hub() ? Matrix3d::Identity() : rotation_matrix(s.attitude);
+  const Layout& l = layout();
+  Matrix3d A = Matrix3d::Identity();
+  Vector3d R = Vector3d::Zero(), V = Vector3d::Zero(), omega = Vector3d::Zero();
   Totals totals;
-  if (!fixed_hub()) totals.add(hub(), {.v = A.transpose() * s.velocity, .omega = s.omega}, A, s.position);
+  if (!fixed_hub()) {
+    A = rotation_matrix(y.segment<4>(l.attitude()));
+    R = y.segment<3>(l.position());
+    V = y.segment<3>(l.velocity());
+    omega = y.segment<3>(l.u_begin());
+    const auto none = y.head(0);
+    totals.add(hub(), A.transpose() * V, omega, none, none, A, R);
+  }
   for (size_t i = 0; i < appendages().size(); ++i) {
     const Appendage& a = appendages()[i];
-    const Matrix3d C = boom_to_hub(static_cast<int>(i), s.angle[i]);
-    const Vector3d v = C.transpose() * (A.transpose() * s.velocity + s.omega.cross(a.hinge.point));
-    const Vector3d w = C.transpose() * s.omega + s.rate[i] * Vector3d::UnitZ();
-    totals.add(a.body, {.v = v, .omega = w, .q = s.q[i], .q_dot = s.q_dot[i]}, A * C, s.position + A * a.hinge.point);
-    totals.balance.elastic += hinge_energy(a.hinge.mechanism, s.angle[i]);
-    if (a.body.n()) totals.balance.elastic += 0.5 * s.q[i].dot(a.body.Ke * s.q[i]);
+    const int at = l.body[i], rate = l.u_begin() + l.base + at, n = a.body.n();
+    const double angle = y[at] + a.hinge.mechanism.threshold;
+    const auto q = y.segment(at + 1, n), q_dot = y.segment(rate + 1, n);
+    const Matrix3d C = boom_to_hub(static_cast<int>(i), angle);
+    const Vector3d v = C.transpose() * (A.transpose() * V + omega.cross(a.hinge.point));
+    const Vector3d w = C.transpose() * omega + y[rate] * Vector3d::UnitZ();
+    totals.add(a.body, v, w, q, q_dot, A * C, R + A * a.hinge.point);
+    totals.balance.elastic += hinge_energy(a.hinge.mechanism, angle);
+    if (n > 0) totals.balance.elastic += 0.5 * q.dot(a.body.Ke.lazyProduct(q));
   }
   totals.balance.angular_momentum -= (totals.first_moment / totals.m).cross(totals.balance.momentum);
   return totals.balance;

@@ -174,6 +174,7 @@ class ExponentialStepper final : public Stepper {
     const Index m = step_.linear->size();
     start_ = y;
     step_.Z.resize(m, points);
+    step_.M.resize(m, points);
     N_.resize(m, points);
     integral_.resize(m);
     step_.Z.col(0).noalias() = step_.linear->to_modes * y.head(nx_);
@@ -222,7 +223,7 @@ class ExponentialStepper final : public Stepper {
     acceleration_.rightCols<degree>().colwise() = acceleration_.col(0).eval();  // a failed step left what it had
     double last_change = 0;
     for (int sweep = 0; sweep < max_sweeps; ++sweep) {
-      step_.M.noalias() = step_.length * N_ * scaled_coefficients_;
+      small_product(N_, step_.length * scaled_coefficients_, step_.M);
       for (int j = 1; j < points; ++j)
         step_.linear->combine(step_.grid->at[static_cast<size_t>(j)], 0, step_.Z.col(0), step_.M, step_.Z.col(j));
       previous_ = step_.X.col(degree);

@@ -2,22 +2,19 @@
 
 #include "dynamics/phi.hpp"
 #include "fem/check.hpp"
+#include "fem/dense.hpp"
 #include "fem/lanes.hpp"
 
 #include <fmt/format.h>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 namespace flexboom {
 
 using Eigen::Index;
-using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
@@ -107,28 +104,28 @@ void small_product(const Eigen::Ref<const MatrixXd>& A, const Eigen::Ref<const M
 LinearPart::LinearPart(MatrixXd L, MatrixXd a_hub_by_x, int first_omega, VectorXd base_p)
     : a_hub(std::move(a_hub_by_x)), base(std::move(base_p)) {
   const VectorXd D = balance(L);
-  const Eigen::EigenSolver<MatrixXd> eigen(L);
-  const MatrixXcd V = eigen.eigenvectors();
-  const MatrixXcd inverse = V.inverse();
-  const double growth = V.cwiseAbs().rowwise().sum().maxCoeff() * inverse.cwiseAbs().rowwise().sum().maxCoeff();
-  if (eigen.info() != Eigen::Success || !(growth < 1e10))
+  const RealEigenvectors eigen = eigenvectors(L);
+  const MatrixXd inverse = eigen.vectors.inverse();
+  const double growth =
+      eigen.vectors.cwiseAbs().rowwise().sum().maxCoeff() * inverse.cwiseAbs().rowwise().sum().maxCoeff();
+  if (!(growth < 1e10))
     throw NumericalError(
         fmt::format("exponential: the Jacobian has no full set of eigenvectors ({:.2g}); try bdf", growth));
-  std::vector<Index> kept;
-  for (Index k = 0; k < L.rows(); ++k)
-    if (eigen.eigenvalues()[k].imag() >= 0) kept.push_back(k);
-  const auto m = static_cast<Index>(kept.size());
+  const Index m = (eigen.imaginary.array() >= 0).count();
   lambda.resize(m);
-  from_modes.resize(L.rows(), 2 * m);
-  to_modes.resize(2 * m, L.rows());
-  for (Index i = 0; i < m; ++i) {
-    const Index k = kept[static_cast<size_t>(i)];
-    lambda[i] = eigen.eigenvalues()[k];
-    const double twice = lambda[i].imag() > 0 ? 2 : 1;
-    from_modes.col(i) = twice * D.cwiseProduct(V.col(k).real());
-    from_modes.col(m + i) = -twice * D.cwiseProduct(V.col(k).imag());
-    to_modes.row(i) = inverse.row(k).real().cwiseQuotient(D.transpose());
-    to_modes.row(m + i) = inverse.row(k).imag().cwiseQuotient(D.transpose());
+  from_modes.setZero(L.rows(), 2 * m);
+  to_modes.setZero(2 * m, L.rows());
+  for (Index i = 0, k = 0; i < m; ++i) {
+    lambda[i] = {eigen.real[k], eigen.imaginary[k]};
+    const bool pair = eigen.imaginary[k] > 0;
+    const double twice = pair ? 2 : 1;
+    from_modes.col(i) = twice * D.cwiseProduct(eigen.vectors.col(k));
+    to_modes.row(i) = inverse.row(k).cwiseQuotient(twice * D.transpose());
+    ++k;
+    if (!pair) continue;
+    from_modes.col(m + i) = -twice * D.cwiseProduct(eigen.vectors.col(k));
+    to_modes.row(m + i) = -inverse.row(k).cwiseQuotient(twice * D.transpose());
+    ++k;
   }
   lambda_re_ = lambda.real();
   lambda_im_ = lambda.imag();
@@ -155,17 +152,10 @@ void LinearPart::remainder(const Eigen::Ref<const MatrixXd>& F, const Eigen::Ref
 }
 
 void LinearPart::point(double c, double h, GridPoint& result) const {
-  const Index m = lambda.size();
-  result.resize(2 * m, functions);
-  std::array<std::complex<double>, functions> phi;
-  for (Index i = 0; i < m; ++i) {
-    phi_functions(c * h * lambda[i], phi);
-    double power = 1;
-    for (Index k = 0; k < functions; ++k, power *= c) {
-      result(i, k) = power * phi[static_cast<size_t>(k)].real();
-      result(m + i, k) = power * phi[static_cast<size_t>(k)].imag();
-    }
-  }
+  result.resize(2 * lambda.size(), functions);
+  phi_functions(c * h, lambda_re_, lambda_im_, result);
+  double power = c;
+  for (Index k = 1; k < functions; ++k, power *= c) result.col(k) *= power;
 }
 
 void LinearPart::grid(double h, Grid& g) const {

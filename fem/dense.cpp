@@ -4,12 +4,15 @@
 
 #include <fmt/format.h>
 
-// Fortran BLAS, 32-bit integers.
+// Fortran BLAS and LAPACK, 32-bit integers.
 extern "C" void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
                        const double* alpha, const double* a, const int* lda, const double* b, const int* ldb,
                        const double* beta, double* c, const int* ldc);
 extern "C" void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha,
                        const double* a, const int* lda, const double* beta, double* c, const int* ldc);
+extern "C" void dgeev_(const char* left, const char* right, const int* n, double* a, const int* lda, double* real,
+                       double* imaginary, double* left_vectors, const int* ld_left, double* right_vectors,
+                       const int* ld_right, double* work, const int* work_size, int* info);
 
 namespace flexboom {
 
@@ -51,6 +54,26 @@ MatrixXd product(const Ref<const MatrixXd>& A, const Ref<const MatrixXd>& X) {
   MatrixXd Y = MatrixXd::Zero(A.rows(), X.cols());
   add_product(Y, 1, Transposed::no, A, X);
   return Y;
+}
+
+RealEigenvectors eigenvectors(MatrixXd A) {
+  require(A.rows() == A.cols(), fmt::format("eigenvectors: the matrix is {} x {}", A.rows(), A.cols()));
+  const auto n = static_cast<int>(A.rows());
+  RealEigenvectors result{Eigen::VectorXd(n), Eigen::VectorXd(n), MatrixXd(n, n)};
+  if (n == 0) return result;
+  const int ask = -1, one = 1;
+  int info = 0;
+  double best = 0;
+  const auto run = [&](double* work, int size) {
+    dgeev_("N", "V", &n, A.data(), &n, result.real.data(), result.imaginary.data(), nullptr, &one,
+           result.vectors.data(), &n, work, &size, &info);
+  };
+  run(&best, ask);
+  Eigen::VectorXd work(static_cast<Eigen::Index>(best));
+  run(work.data(), static_cast<int>(work.size()));
+  if (info != 0 || !result.vectors.allFinite())
+    throw NumericalError(fmt::format("eigenvectors: LAPACK failed ({}) on a matrix of {} rows", info, n));
+  return result;
 }
 
 }  // namespace flexboom

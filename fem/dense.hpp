@@ -21,4 +21,14 @@ Eigen::MatrixXd transposed_product(const Eigen::Ref<const Eigen::MatrixXd>& A,
 /// A X by the BLAS.
 Eigen::MatrixXd product(const Eigen::Ref<const Eigen::MatrixXd>& A, const Eigen::Ref<const Eigen::MatrixXd>& X);
 
+/// Eigenvalues and right eigenvectors of a real matrix, of length 1. Of a conjugate pair the eigenvalue with the
+/// positive imaginary part comes first, and the two columns are the real and the imaginary part of its vector.
+struct RealEigenvectors {
+  Eigen::VectorXd real, imaginary;
+  Eigen::MatrixXd vectors;
+};
+
+/// By LAPACK. @throws NumericalError when it does not converge.
+RealEigenvectors eigenvectors(Eigen::MatrixXd A);
+
 }  // namespace flexboom

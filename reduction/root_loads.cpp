@@ -15,13 +15,15 @@ using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
 using Eigen::MatrixXd;
+using Eigen::Ref;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 /// Coordinates, or zeros for none.
 VectorXd coordinates(const ReducedBody& body, const VectorXd& q, const char* name) {
-  require(q.size() == 0 || q.size() == body.n(),
-          fmt::format("body \"{}\": motion has {} values of {}, must have {}", body.name, q.size(), name, body.n()));
+  if (q.size() != 0 && q.size() != body.n())  // no text where it fits: balances ask at every output
+    throw InputError(
+        fmt::format("body \"{}\": motion has {} values of {}, must have {}", body.name, q.size(), name, body.n()));
   return q.size() > 0 ? q : VectorXd::Zero(body.n());
 }
 
@@ -50,17 +52,33 @@ DeformedInertia deformed_inertia(const ReducedBody& body, const VectorXd& q) {
 }
 
 BodyMomenta momenta(const ReducedBody& body, const BodyMotion& motion) {
-  const VectorXd q_dot = coordinates(body, motion.q_dot, "q_dot");
-  const auto& [mc, J, Cr] = deformed_inertia(body, coordinates(body, motion.q, "q"));
-  const Vector3d& v = motion.v;
-  const Vector3d& w = motion.omega;
+  return momenta(body, motion.v, motion.omega, coordinates(body, motion.q, "q"),
+                 coordinates(body, motion.q_dot, "q_dot"));
+}
+
+BodyMomenta momenta(const ReducedBody& body, const Vector3d& v, const Vector3d& w, const Ref<const VectorXd>& q,
+                    const Ref<const VectorXd>& q_dot) {
+  Vector3d mc = body.mc0, slid = Vector3d::Zero(), turned = Vector3d::Zero();  // Ct q_dot, Cr q_dot
+  Matrix3d J = body.J0;
+  double elastic = 0;
+  if (body.n() > 0) {
+    mc += body.Ct.lazyProduct(q);
+    slid = body.Ct.lazyProduct(q_dot);
+    turned = body.Cr0.lazyProduct(q_dot);
+    elastic = q_dot.dot(body.Me.lazyProduct(q_dot));
+  }
+  for (Index k = 0; k < body.n(); ++k) {
+    const auto kk = static_cast<size_t>(k);
+    J += q(k) * body.J1[kk];
+    turned += q(k) * body.Cr1[kk].lazyProduct(q_dot);
+    for (Index l = 0; l < body.n(); ++l) J += q(k) * q(l) * body.J2[kk][static_cast<size_t>(l)];
+  }
   // P = m v + w x mc + Ct q_dot, H = mc x v + J w + Cr q_dot, 2 T = v . P + w . H + q_dot . (Ct^T v + Cr^T w + Me
   // q_dot)
   BodyMomenta r;
-  r.linear = body.m * v + w.cross(mc) + body.Ct * q_dot;
-  r.angular = mc.cross(v) + J * w + Cr * q_dot;
-  const VectorXd elastic = body.Ct.transpose() * v + Cr.transpose() * w + body.Me * q_dot;
-  r.kinetic = (v.dot(r.linear) + w.dot(r.angular) + q_dot.dot(elastic)) / 2;
+  r.linear = body.m * v + w.cross(mc) + slid;
+  r.angular = mc.cross(v) + J * w + turned;
+  r.kinetic = (v.dot(r.linear) + w.dot(r.angular) + v.dot(slid) + w.dot(turned) + elastic) / 2;
   return r;
 }
 
