@@ -62,6 +62,10 @@ StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorX
     least_.segment<3>(at.R).setConstant(round_off * length);
     least_.segment<4>(at.p).setConstant(round_off);
     for (int k = 0; k < at.n; ++k) {
+      // Where joints hold a body at places known to round-off, that is how well they know what it stretches by.
+      double shape = 0;
+      for (const Marker& m : b.markers) shape = std::max(shape, m.S.col(k).norm());
+      if (shape > 0) least_[at.q + k] = round_off * length / shape;
       const double u = speed(at.u + k, 1, b.Me(k, k));
       scale_[at.u + k] = u;
       scale_[at.q + k] =
