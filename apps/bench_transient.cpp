@@ -32,7 +32,6 @@ std::vector<Case> cases(const std::vector<std::string>& scenes) {
     std::vector<Case> list;
     for (const std::string& name : scenes) {
       list.push_back({name, load_scene(name), "bdf"});
-      for (BodyScene& b : list.back().scene.bodies) b.stiffening = "off";  // multipliers have none
     }
     return list;
   }

@@ -23,9 +23,8 @@ struct TransientBench {
 /// Work against precision: every method on the scenes named (paths or built-in), or else on SPORT with 2 and with 8
 /// modes per boom, without damping, and tumbling, at tolerances 1e-2 to 1e-9. Reference of a scene: another method than
 /// the one judged, at 1e-11 (bdf, or adams where nothing is damped; for that one, exponential, or adams for scenes with
-/// joints). "ida" flies the formulation by multipliers; geometric stiffness, which it has not, is off in scenes that
-/// are named. A method ends where its next tolerance would take longer than `longest` seconds. Calls `seen` after each
-/// row.
+/// joints). "ida" flies the formulation by multipliers. A method ends where its next tolerance would take longer than
+/// `longest` seconds. Calls `seen` after each row.
 /// @throws InputError for a scene that closes a loop.
 std::vector<TransientBench> bench_transient(const std::vector<std::string>& scenes, double longest,
                                             const std::function<void(const TransientBench&)>& seen);

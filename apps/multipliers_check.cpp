@@ -13,10 +13,6 @@ void check_multipliers(const Scene& scene, toml_reader::Faults& faults) {
     faults.add("integrator.rescale_at_events", fmt::format("is true, which \"multipliers\" cannot follow{}", relative));
   if (scene.orbit && scene.orbit->gravity == "differential")
     faults.add("orbit.gravity", fmt::format("is \"differential\", which \"multipliers\" leave out{}", relative));
-  for (size_t i = 0; i < scene.bodies.size(); ++i)
-    if (scene.bodies[i].stiffening == "on")
-      faults.add(fmt::format("bodies[{}].stiffening", i),
-                 fmt::format("is \"on\", but \"multipliers\" leave geometric stiffness out{}", relative));
 }
 
 }  // namespace flexboom

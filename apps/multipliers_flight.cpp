@@ -125,20 +125,20 @@ std::vector<double> largest_stiffening(const Multipliers& system, const Multibod
 }
 
 std::vector<std::string> warnings_of(const Scene& scene, const MultibodyTrajectory& flight,
-                                     const std::vector<double>& stiffening) {
+                                     const std::vector<double>& effect, const std::vector<Stiffening>& stiffening) {
   std::vector<std::string> warnings;
   if (const auto& rows = flight.summary.redundant; !rows.empty())
     warnings.push_back(
         fmt::format("{} constraint rows follow from the others and are left out, so how these joints share such loads "
                     "is not determined: {}",
                     rows.size(), fmt::join(rows, "; ")));
-  for (size_t b = 0; b < stiffening.size(); ++b)
-    if (stiffening[b] > scene.tolerance)
+  for (size_t b = 0; b < effect.size(); ++b)
+    if (stiffening[b] == Stiffening::off && effect[b] > scene.tolerance)
       warnings.push_back(
-          fmt::format("body {}: this formulation leaves its geometric stiffness out; it reaches {:.2g} of its "
-                      "stiffness, more than the tolerance {:.2g}{}",
-                      scene.bodies[b].name, stiffening[b], scene.tolerance,
-                      stiffening[b] > 0.1 ? ": without it the motion can be wrong or diverge" : ""));
+          fmt::format("body {}: its geometric stiffness is left out; it reaches {:.2g} of its stiffness, more than the "
+                      "tolerance {:.2g}{}",
+                      scene.bodies[b].name, effect[b], scene.tolerance,
+                      effect[b] > 0.1 ? ": without it the motion can be wrong or diverge" : ""));
   return warnings;
 }
 
@@ -162,26 +162,34 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
   const Stopwatch start;
   Multibody all = make_multibody(scene, bodies);
   const Scene open = without_loops(scene);
+  const Multibody opened = make_multibody(open, bodies);
+  std::vector<Stiffening> stiffening = first_stiffening(open, opened);
   Run r;
-  r.tree = std::make_shared<const Tree>(make_multibody(open, bodies));
   r.bodies = std::move(bodies);
-  VectorXd y0 = first_state(open, *r.tree);
   IntegratorOptions options = integrator_options(scene, hooks, "ida", max_steps);
-  r.tree->impose(options.start, y0);
-  const TreeState asked = r.tree->unpack(y0);
-  for (size_t i = 0; i < all.wheels.size(); ++i) all.wheels[i].spin = asked.spin[i];
-  const Multipliers system(std::move(all));
-  const std::vector<BodyState> closed = close_joints(system, body_states(*r.tree, options.start, y0), options.start);
   set_corners(scene, options);
   if (scene.from) options.stops = scene.from->stops(joint_names(scene));
-  MultipliersOptions of_flight =
-      multipliers_options(options, start_angles(system.multibody(), asked, scene.from.get()));
-  set_energies(of_flight, r.tree->layout(), y0);
   r.prepare_seconds = start.seconds();
 
   const Stopwatch flight_time;
-  MultibodyTrajectory flight = integrate_multipliers(system, closed, of_flight);
-  const std::vector<TreeState> states = states_of(system, flight);
+  std::unique_ptr<const Multipliers> system;
+  TreeState asked;
+  MultibodyTrajectory flight;
+  do {
+    r.tree = std::make_shared<const Tree>(opened, stiffening);
+    VectorXd y0 = first_state(open, *r.tree);
+    r.tree->impose(options.start, y0);
+    asked = r.tree->unpack(y0);
+    for (size_t i = 0; i < all.wheels.size(); ++i) all.wheels[i].spin = asked.spin[i];
+    system = std::make_unique<const Multipliers>(all, stiffening);
+    const std::vector<BodyState> closed = close_joints(*system, body_states(*r.tree, options.start, y0), options.start);
+    MultipliersOptions of_flight =
+        multipliers_options(options, start_angles(system->multibody(), asked, scene.from.get()));
+    set_energies(of_flight, r.tree->layout(), y0);
+    flight = integrate_multipliers(*system, closed, of_flight);
+    r.stiffening_effect = largest_stiffening(*system, flight);
+  } while (!flight.summary.interrupted && revise_stiffening(scene, opened, r.stiffening_effect, stiffening));
+  const std::vector<TreeState> states = states_of(*system, flight);
   for (size_t row = 0; row < states.size(); ++row) {
     VectorXd y = r.tree->pack(without_loops(scene, states[row]));
     y[r.tree->layout().dissipated_elsewhere] = flight.states[row].dissipated;
@@ -189,13 +197,12 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
     r.motion.y.push_back(std::move(y));
   }
   r.outputs = tree_output_table(scene, *r.tree, flight.time.size(), [&](size_t row) {
-    return TreeMoment{flight.time[row], states[row], joint_loads(system, flight.states[row]),
+    return TreeMoment{flight.time[row], states[row], joint_loads(*system, flight.states[row]),
                       balance_of(*r.tree, flight, row, r.motion.y[row])};
   });
-  r.stiffening_effect = largest_stiffening(system, flight);
-  r.stiffening_left_out = r.stiffening_effect.empty() ? 0 : std::ranges::max(r.stiffening_effect);
+  r.stiffening_left_out = largest_left_out(r.stiffening_effect, stiffening);
   note_moved_starts(scene, asked, states.front(), r.notes);
-  r.warnings = warnings_of(scene, flight, r.stiffening_effect);
+  r.warnings = warnings_of(scene, flight, r.stiffening_effect, stiffening);
   r.motion.time = std::move(flight.time);
   r.motion.events = events_of(flight.events, 0);
   r.motion.summary = summary_of(flight.summary);

@@ -235,7 +235,9 @@ IntegratorOptions options_of(const Scene& scene, const Multibody& bodies, const 
 
 bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty(); }
 
-std::vector<Stiffening> first_choice(const Scene& scene, const Multibody& bodies) {
+}  // namespace
+
+std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& bodies) {
   const Tree plain(bodies);
   std::vector<Stiffening> choice =
       stiffening_where_it_counts(bodies, plain.unpack(first_state(scene, plain)), scene.duration, scene.tolerance);
@@ -246,12 +248,12 @@ std::vector<Stiffening> first_choice(const Scene& scene, const Multibody& bodies
   return choice;
 }
 
-/// Turns on what the flight showed to count. Was there any?
-bool revise(const Scene& scene, const Tree& tree, const TreeTrajectory& flight, std::vector<Stiffening>& choice) {
+bool revise_stiffening(const Scene& scene, const Multibody& bodies, const std::vector<double>& effect,
+                       std::vector<Stiffening>& choice) {
   bool changed = false;
   for (size_t i = 0; i < choice.size(); ++i) {
-    const bool wanted = scene.bodies[i].stiffening == "auto" && has_stiffening(tree.scene().bodies[i]) &&
-                        flight.stiffening_effect[i] > scene.tolerance;
+    const bool wanted =
+        scene.bodies[i].stiffening == "auto" && has_stiffening(bodies.bodies[i]) && effect[i] > scene.tolerance;
     if (!wanted || choice[i] == Stiffening::on) continue;
     choice[i] = Stiffening::on;
     changed = true;
@@ -259,21 +261,19 @@ bool revise(const Scene& scene, const Tree& tree, const TreeTrajectory& flight, 
   return changed;
 }
 
-double stiffening_left_out(const Tree& tree, const TreeTrajectory& flight) {
+double largest_left_out(const std::vector<double>& effect, const std::vector<Stiffening>& choice) {
   double worst = 0;
-  for (size_t i = 0; i < flight.stiffening_effect.size(); ++i)
-    if (tree.stiffening(static_cast<int>(i)) == Stiffening::off) worst = std::max(worst, flight.stiffening_effect[i]);
+  for (size_t i = 0; i < effect.size(); ++i)
+    if (choice[i] == Stiffening::off) worst = std::max(worst, effect[i]);
   return worst;
 }
-
-}  // namespace
 
 Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
   const Stopwatch start;
   const Multibody multibody = make_multibody(scene, bodies);
   IntegratorOptions options = options_of(scene, multibody, hooks, max_steps);
   if (scene.from) options.stops = scene.from->stops(joint_names(scene));
-  std::vector<Stiffening> stiffening = first_choice(scene, multibody);
+  std::vector<Stiffening> stiffening = first_stiffening(scene, multibody);
   Run r;
   r.bodies = std::move(bodies);
   r.prepare_seconds = start.seconds();
@@ -282,10 +282,10 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   do {
     r.tree = std::make_shared<const Tree>(multibody, stiffening);
     flight = integrate(*r.tree, first_state(scene, *r.tree), options);
-  } while (!flight.summary.interrupted && revise(scene, *r.tree, flight, stiffening));
+  } while (!flight.summary.interrupted && revise_stiffening(scene, multibody, flight.stiffening_effect, stiffening));
   r.outputs = tree_output_table(scene, *r.tree, flight);
   r.stiffening_effect = flight.stiffening_effect;
-  r.stiffening_left_out = stiffening_left_out(*r.tree, flight);
+  r.stiffening_left_out = largest_left_out(r.stiffening_effect, stiffening);
   r.warnings = std::move(flight.warnings);
   r.motion.time = std::move(flight.time);
   r.motion.y = std::move(flight.y);

@@ -27,6 +27,15 @@ void set_end(Run&, const Scene&);
 PreparedBody prepare_rigid(const BodyScene&);
 PreparedBody prepare_reduced(const BodyScene&);
 
+/// Geometric stiffness of each body: as the scene says, "auto" by what its start and prescribed motions make of it.
+std::vector<Stiffening> first_stiffening(const Scene&, const Multibody&);
+
+/// Turns on what a flight showed to count: `effect` per body. Was there any?
+bool revise_stiffening(const Scene&, const Multibody&, const std::vector<double>& effect, std::vector<Stiffening>&);
+
+/// Of the bodies where it is off.
+double largest_left_out(const std::vector<double>& effect, const std::vector<Stiffening>&);
+
 /// One flight of a scene with joints. Geometric stiffness "auto" is on where it exceeds the tolerance at the start,
 /// under the prescribed motions, or (then the flight is repeated with it) at any output.
 /// `max_steps` > 0 bounds its cost. @throws InputError, NumericalError.

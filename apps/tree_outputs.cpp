@@ -163,13 +163,13 @@ void describe_tree(const Scene& scene, const Run& run, std::vector<std::string>&
     if (run.bodies[i].body.n() == 0) continue;
     const bool known = !run.bodies[i].body.Kg.spin.empty();
     const bool on = run.tree->stiffening(static_cast<int>(i)) == Stiffening::on;
-    const std::string why = scene.formulation == "multipliers" ? "left out by multipliers"
-                                                               : fmt::format("stiffening = \"{}\"", b.stiffening);
-    plan.push_back(known ? fmt::format("{}: geometric stiffness {} ({}): its effect reaches {:.2g} of the stiffness of "
-                                       "the body",
-                                       b.name, on ? "on" : "off", why, run.stiffening_effect[i])
-                         : fmt::format("{}: geometric stiffness unknown and left out ({}); its effect is not measured",
-                                       b.name, b.reduced ? "not in the file" : "structure \"eq14\""));
+    plan.push_back(
+        known ? fmt::format(
+                    "{}: geometric stiffness {} (stiffening = \"{}\"): its effect reaches {:.2g} of the stiffness of "
+                    "the body",
+                    b.name, on ? "on" : "off", b.stiffening, run.stiffening_effect[i])
+              : fmt::format("{}: geometric stiffness unknown and left out ({}); its effect is not measured", b.name,
+                            b.reduced ? "not in the file" : "structure \"eq14\""));
   }
   for (const JointScene& j : scene.joints)
     plan.push_back(fmt::format("joint {}: {}, {} on {}{}{}", j.name, joint_type(j.kind).name, j.b.body,

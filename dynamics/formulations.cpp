@@ -47,9 +47,7 @@ PlaceMotionInSpace motion_of(const PlaceData& place, const std::vector<BodyState
   if (place.body >= 0) {
     const BodyState& s = bodies[static_cast<size_t>(place.body)];
     frame = {vec3(s.position), vec3(s.velocity), vec3(s.omega), rotation(s.attitude.data())};
-    if (place.flexible)
-      elastic = {vec3(place.S * s.q), vec3(place.S_theta * s.q), vec3(place.S * s.q_dot),
-                 vec3(place.S_theta * s.q_dot)};
+    if (place.flexible) elastic = elastic_at(place, s.q.data(), s.q_dot.data());
   }
   const PlaceMotion<double> m = place_motion(place, frame, elastic);
   PlaceMotionInSpace r{eigen(m.r), eigen(m.r_dot), eigen(m.omega), {}};

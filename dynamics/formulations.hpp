@@ -21,7 +21,7 @@ TreeState tree_state(const Multipliers&, const MultibodyState&);
 /// As Tree::joint_loads, for all joints. Where constraint rows were left out, the others carry their load.
 std::vector<JointLoad> joint_loads(const Multipliers&, const MultibodyState&);
 
-/// As Tree::stiffening_effect: this formulation leaves geometric stiffness out.
+/// As Tree::stiffening_effect.
 std::vector<double> stiffening_effect(const Multipliers&, const MultibodyState&);
 
 }  // namespace flexboom

@@ -13,6 +13,9 @@
 
 namespace flexboom {
 
+/// Is the geometric stiffness of a body in the equations? `stiffening_effect` tells its size.
+enum class Stiffening { off, on };
+
 /// A place on a body where something is joined, pushed or measured. With a marker, it moves by S q and turns by the
 /// rotation vector S_theta q (exponential map, BRF axes) with the flexible body; without one it is fixed in the BRF.
 struct Place {

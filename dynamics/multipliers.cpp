@@ -1,5 +1,6 @@
 #include "dynamics/multipliers.hpp"
 
+#include "dynamics/body_constants.hpp"
 #include "dynamics/multipliers_start.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
@@ -18,9 +19,69 @@ using Eigen::VectorXd;
 
 namespace redundant {
 
-BodyData body_data(const ReducedBody& b) {
+namespace {
+
+/// Non-zeros of a vector of matrices, by component, times a factor.
+std::vector<Entry> entries_of(const std::vector<Eigen::MatrixXd>& K, double factor) {
+  std::vector<Entry> entries;
+  for (size_t c = 0; c < K.size(); ++c)
+    for (Index k = 0; k < K[c].rows(); ++k)
+      for (Index l = 0; l < K[c].cols(); ++l)
+        if (K[c](k, l) != 0)
+          entries.push_back({static_cast<size_t>(k), static_cast<size_t>(l), c, factor * K[c](k, l)});
+  return entries;
+}
+
+}  // namespace
+
+PlaceShapes shapes_at(const PlaceData& p, const double* q) {
+  PlaceShapes shapes{p.S, p.S_theta};
+  const auto add = [q](const std::vector<Entry>& slope, Eigen::Matrix3Xd& S) {
+    for (const Entry& e : slope) S(static_cast<Index>(e.component), static_cast<Index>(e.k)) += e.value * q[e.l];
+  };
+  add(p.S_slope, shapes.S);
+  add(p.theta_slope, shapes.S_theta);
+  return shapes;
+}
+
+Elastic<double> elastic_at(const PlaceData& p, const double* q, const double* q_dot) {
+  Elastic<double> e;
+  for (Index k = 0; k < p.S.cols(); ++k) {
+    const double* const S = p.S.col(k).data();
+    const double* const T = p.S_theta.col(k).data();
+    const Vec3<double> shift{S[0], S[1], S[2]}, turn{T[0], T[1], T[2]};
+    e.s += q[k] * shift, e.phi += q[k] * turn, e.s_dot += q_dot[k] * shift, e.phi_dot += q_dot[k] * turn;
+  }
+  const auto add = [&](const std::vector<Entry>& slope, Vec3<double>& x, Vec3<double>& x_dot) {
+    for (const Entry& s : slope) {
+      component_of(x, s.component) += 0.5 * s.value * (q[s.k] * q[s.l]);
+      component_of(x_dot, s.component) += s.value * (q[s.l] * q_dot[s.k]);
+    }
+  };
+  add(p.S_slope, e.s, e.s_dot);
+  add(p.theta_slope, e.phi, e.phi_dot);
+  return e;
+}
+
+Elastic<double> elastic_bias(const PlaceData& p, const double* q_dot) {
+  Elastic<double> e;
+  for (const Entry& s : p.S_slope) component_of(e.s_dot, s.component) += s.value * (q_dot[s.k] * q_dot[s.l]);
+  for (const Entry& s : p.theta_slope) component_of(e.phi_dot, s.component) += s.value * (q_dot[s.k] * q_dot[s.l]);
+  return e;
+}
+
+BodyData body_data(const ReducedBody& body, Stiffening stiffening) {
+  const bool second_order = stiffening == Stiffening::on && body.n() > 0;
+  require(!second_order || !body.Kg.spin.empty(),
+          fmt::format("body {}: its geometric stiffness is asked for but the reduced body has none", body.name));
+  ReducedBody b = body;
+  if (second_order) add_second_order_inertia(b);
   const auto n = static_cast<size_t>(b.n());
-  BodyData d{n, b.m, spatial::vec3(b.mc0), spatial::sym3(b.J0), {}, {}, {}, {}, {}, b.Me, b.Ke, b.De};
+  BodyData d{n, b.m, spatial::vec3(b.mc0), spatial::sym3(b.J0), {}, {}, {}, {}, {}, {}, {}, b.Me, b.Ke, b.De};
+  if (second_order) {
+    d.Ct_slope = entries_of(b.Kg.acceleration, 1);
+    d.Cr_slope = entries_of(b.Kg.angular_acceleration, 1);
+  }
   constexpr std::array<std::array<Index, 2>, 6> symmetric = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}}};
   const auto nonzeros = [&](const Matrix3d& M, size_t k, size_t l, std::vector<Entry>& out) {
     for (size_t c = 0; c < 6; ++c)
@@ -43,7 +104,8 @@ BodyData body_data(const ReducedBody& b) {
 
 namespace {
 
-PlaceData place_data(const Multibody& scene, const Place& place, const std::string& where) {
+PlaceData place_data(const Multibody& scene, const std::vector<Stiffening>& stiffening, const Place& place,
+                     const std::string& where) {
   const int bodies = static_cast<int>(scene.bodies.size());
   require(place.body >= -1 && place.body < bodies,
           fmt::format("{}: body {} does not exist, there are 0 to {} and -1, the inertial frame", where, place.body,
@@ -62,6 +124,11 @@ PlaceData place_data(const Multibody& scene, const Place& place, const std::stri
     p.S = m.S, p.S_theta = m.S_theta;
     if (p.flexible && p.S.cols() == 0) p.S = Eigen::Matrix3Xd::Zero(3, body.n());
     if (p.flexible && p.S_theta.cols() == 0) p.S_theta = Eigen::Matrix3Xd::Zero(3, body.n());
+    for (const MarkerStiffness& K : body.Kg.markers) {  // a load on it does the work -1/2 q^T Kg q
+      if (K.marker != place.marker || stiffening[static_cast<size_t>(place.body)] == Stiffening::off) continue;
+      p.S_slope = entries_of(K.force, -1);
+      p.theta_slope = entries_of(K.torque, -1);
+    }
   }
   p.position = spatial::vec3(position);
   for (size_t i = 0; i < 3; ++i) p.axes.row[i] = spatial::vec3(place.axes.row(static_cast<Index>(i)).transpose());
@@ -73,18 +140,22 @@ PlaceData place_data(const Multibody& scene, const Place& place, const std::stri
 
 using namespace redundant;
 
-Multipliers::Multipliers(Multibody scene) : impl_(std::make_unique<Impl>()) {
+Multipliers::Multipliers(Multibody scene, std::vector<Stiffening> stiffening) : impl_(std::make_unique<Impl>()) {
   Impl& p = *impl_;
   p.scene = std::move(scene);
   require(!p.scene.bodies.empty(), "a multibody system needs a body");
-  for (const ReducedBody& b : p.scene.bodies) {
-    b.validate();
-    p.bodies.push_back(body_data(b));
+  require(stiffening.size() == 1 || stiffening.size() == p.scene.bodies.size(),
+          "geometric stiffness: one choice for all bodies or one per body is needed");
+  p.stiffening = std::move(stiffening);
+  p.stiffening.resize(p.scene.bodies.size(), p.stiffening.front());
+  for (size_t i = 0; i < p.scene.bodies.size(); ++i) {
+    p.scene.bodies[i].validate();
+    p.bodies.push_back(body_data(p.scene.bodies[i], p.stiffening[i]));
   }
   for (const Joint& j : p.scene.joints) {
     const std::string where = fmt::format("joint \"{}\"", j.name);
-    JointData d{place_data(p.scene, j.a, where + ", place a"), place_data(p.scene, j.b, where + ", place b"),
-                joint_rows(j)};
+    JointData d{place_data(p.scene, p.stiffening, j.a, where + ", place a"),
+                place_data(p.scene, p.stiffening, j.b, where + ", place b"), joint_rows(j)};
     require(d.a.body != d.b.body, where + ": both places are on one body");
     const HingeMechanism& m = j.mechanism;
     const bool acts = m.stiffness != 0 || m.damping != 0 || m.stop_stiffness != 0;
@@ -98,11 +169,12 @@ Multipliers::Multipliers(Multibody scene) : impl_(std::make_unique<Impl>()) {
   }
   for (const SpringDamper& s : p.scene.springs) {
     const std::string where = fmt::format("spring \"{}\"", s.name);
-    p.springs.push_back(
-        {place_data(p.scene, s.a, where + ", place a"), place_data(p.scene, s.b, where + ", place b"), {}});
+    p.springs.push_back({place_data(p.scene, p.stiffening, s.a, where + ", place a"),
+                         place_data(p.scene, p.stiffening, s.b, where + ", place b"),
+                         {}});
   }
   for (const Load& l : p.scene.loads) {
-    p.loads.push_back(place_data(p.scene, l.at, fmt::format("load \"{}\"", l.name)));
+    p.loads.push_back(place_data(p.scene, p.stiffening, l.at, fmt::format("load \"{}\"", l.name)));
     require(l.at.body >= 0, fmt::format("load \"{}\": it acts on the inertial frame", l.name));
   }
   for (const ReactionWheel& w : p.scene.wheels) {
@@ -117,6 +189,7 @@ Multipliers::~Multipliers() = default;
 Multipliers::Multipliers(Multipliers&&) noexcept = default;
 
 const Multibody& Multipliers::multibody() const { return impl_->scene; }
+Stiffening Multipliers::stiffening(int body) const { return impl_->stiffening[static_cast<size_t>(body)]; }
 
 namespace {
 

@@ -90,12 +90,14 @@ struct MultibodyTrajectory {
 /// construction.
 class Multipliers {
  public:
+  /// One choice of geometric stiffness for all bodies or one per body.
   /// @throws InputError when a body, place or joint is not valid, naming it.
-  explicit Multipliers(Multibody);
+  explicit Multipliers(Multibody, std::vector<Stiffening> stiffening = {Stiffening::off});
   ~Multipliers();
   Multipliers(Multipliers&&) noexcept;
 
   const Multibody& multibody() const;
+  Stiffening stiffening(int body) const;
 
   struct Impl;
   const Impl& impl() const { return *impl_; }

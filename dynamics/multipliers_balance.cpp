@@ -3,7 +3,6 @@
 #include "dynamics/multipliers_scales.hpp"
 
 #include "dynamics/rotation.hpp"
-#include "reduction/root_loads.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -24,22 +23,21 @@ Balance balance_of(const Equations& equations, const VectorXd& y, const JointMem
     const BodyState& s = states[i];
     const ReducedBody& body = scene.bodies[i];
     const Matrix3d A = rotation_matrix(s.attitude);
-    BodyMomenta of = momenta(body, {.v = A.transpose() * s.velocity, .omega = s.omega, .q = s.q, .q_dot = s.q_dot});
+    Equations::Momenta of = equations.momenta(i, y.data());
     for (size_t k = 0; k < scene.wheels.size(); ++k) {
       const ReactionWheel& w = scene.wheels[k];
       if (w.body != static_cast<int>(i)) continue;
       const double h = y[equations.wheel(k)];
-      of.angular += h * w.axis;
+      of.angular += A * (h * w.axis);
       of.kinetic += h * h / (2 * w.inertia);
     }
-    const Vector3d P = A * of.linear, H = A * of.angular;
     b.kinetic += of.kinetic;
-    b.momentum += P;
-    b.momentum_scale += P.norm();
-    b.angular_momentum += H + s.position.cross(P);
-    b.angular_momentum_scale += H.norm();
+    b.momentum += of.linear;
+    b.momentum_scale += of.linear.norm();
+    b.angular_momentum += of.angular + s.position.cross(of.linear);
+    b.angular_momentum_scale += of.angular.norm();
     m += body.m;
-    first_moment += body.m * s.position + A * (body.mc0 + body.Ct * s.q);
+    first_moment += body.m * s.position + of.first_moment;
   }
   b.angular_momentum -= (first_moment / m).cross(b.momentum);
   b.elastic = equations.potential(y.data(), memory);

@@ -98,15 +98,9 @@ Frame<double> Equations::frame(int body, const double* y) const {
 }
 
 Elastic<double> Equations::elastic(const PlaceData& p, const double* y) const {
-  Elastic<double> e;
-  if (!p.flexible) return e;
+  if (!p.flexible) return {};
   const BodyPlaces& at = places_[static_cast<size_t>(p.body)];
-  for (Index k = 0; k < at.n; ++k) {
-    const double q = y[at.q + k], u = y[at.u + k];
-    const Vec3<double> S = three(p.S.col(k).data()), T = three(p.S_theta.col(k).data());
-    e.s += q * S, e.phi += q * T, e.s_dot += u * S, e.phi_dot += u * T;
-  }
-  return e;
+  return elastic_at(p, y + at.q, y + at.u);
 }
 
 PairMotion<double> Equations::pair(const JointData& j, double t, const double* y, const Joint* joint) const {
@@ -124,14 +118,29 @@ RowMultipliers Equations::multipliers(const JointData& j, const double* y) const
   return m;
 }
 
-void Equations::scatter(const PlaceData& p, const PlaceForce<double>& f, double* F) const {
+namespace {
+
+/// Subtracts scale_k times the force on q_k.
+template <class Scale>
+void subtract_elastic(const PlaceData& p, const PlaceForce<double>& f, const double* q, const Scale& scale, double* F) {
+  const std::array<double, 6> force = {f.s.x, f.s.y, f.s.z, f.phi.x, f.phi.y, f.phi.z};
+  for (Index k = 0; k < p.S.cols(); ++k)
+    F[k] -= scale(k) * (dot(three(p.S.col(k).data()), f.s) + dot(three(p.S_theta.col(k).data()), f.phi));
+  for (const Entry& e : p.S_slope) F[e.k] -= scale(static_cast<Index>(e.k)) * (e.value * q[e.l] * force[e.component]);
+  for (const Entry& e : p.theta_slope)
+    F[e.k] -= scale(static_cast<Index>(e.k)) * (e.value * q[e.l] * force[3 + e.component]);
+}
+
+}  // namespace
+
+void Equations::scatter(const PlaceData& p, const PlaceForce<double>& f, const double* y, double* F) const {
   if (p.body < 0) return;
   const BodyPlaces& at = places_[static_cast<size_t>(p.body)];
   subtract(f.R, F + at.v);
   subtract(f.w, F + at.w);
-  if (!p.flexible) return;
-  for (Index k = 0; k < at.n; ++k)
-    F[at.u + k] -= dot(three(p.S.col(k).data()), f.s) + dot(three(p.S_theta.col(k).data()), f.phi);
+  if (p.flexible)
+    subtract_elastic(
+        p, f, y + at.q, [](Index) { return 1.0; }, F + at.u);
 }
 
 /// The same in the kinematic rows, weighed with the inverse metric.
@@ -142,9 +151,9 @@ void Equations::scatter_correction(const PlaceData& p, const PlaceForce<double>&
   subtract(metric[0] * f.R, F + at.R);
   const std::array<double, 4> turn = half_product(y + at.p, metric[3] * f.w);
   for (size_t k = 0; k < 4; ++k) F[at.p + static_cast<int>(k)] -= turn[k];
-  if (!p.flexible) return;
-  for (Index k = 0; k < at.n; ++k)
-    F[at.q + k] -= metric[6 + k] * (dot(three(p.S.col(k).data()), f.s) + dot(three(p.S_theta.col(k).data()), f.phi));
+  if (p.flexible)
+    subtract_elastic(
+        p, f, y + at.q, [&](Index k) { return metric[6 + k]; }, F + at.q);
 }
 
 void Equations::body_residual(size_t i, const double* y, const double* y_dot, double* F) {
@@ -160,7 +169,7 @@ void Equations::body_residual(size_t i, const double* y, const double* y_dot, do
       rotation(p),         three(y + at.w), y + at.q, y + at.u, three(y_dot + at.v) - vec3(scene_.gravity),
       three(y_dot + at.w), y_dot + at.u};
   Vec3<double> on_R, on_w;
-  body_forces(prepared_.bodies[i], x, scratch_->bodies[i].Cr, on_R, on_w, scratch_->bodies[i].on_q.data());
+  body_forces(prepared_.bodies[i], x, scratch_->bodies[i].deformed, on_R, on_w, scratch_->bodies[i].on_q.data());
   subtract(-on_R, F + at.v);
   subtract(-on_w, F + at.w);
   for (int k = 0; k < at.n; ++k) F[at.u + k] += scratch_->bodies[i].on_q[static_cast<size_t>(k)];
@@ -185,8 +194,8 @@ void Equations::residual(double t, const double* y, const double* y_dot, const J
                     forces, loss);
     for (size_t k = 0; k < j.rows.size(); ++k)
       if (j.rows[k].kept) F[j.rows[k].mu] = g[k], F[j.rows[k].lambda] = g_dot[k];
-    scatter(j.a, forces.a, F);
-    scatter(j.b, forces.b, F);
+    scatter(j.a, forces.a, y, F);
+    scatter(j.b, forces.b, y, F);
     scatter_correction(j.a, correction.a, y, F);
     scatter_correction(j.b, correction.b, y, F);
   }
@@ -196,8 +205,8 @@ void Equations::residual(double t, const double* y, const double* y_dot, const J
     PairForces<double> forces;
     act_spring(j, scene_.springs[i], x, place_motion(j.a, x.frame_a, x.elastic_a),
                place_motion(j.b, x.frame_b, x.elastic_b), forces, loss);
-    scatter(j.a, forces.a, F);
-    scatter(j.b, forces.b, F);
+    scatter(j.a, forces.a, y, F);
+    scatter(j.b, forces.b, y, F);
   }
   for (size_t i = 0; i < scene_.loads.size(); ++i) {
     const PlaceData& p = prepared_.loads[i];
@@ -206,7 +215,7 @@ void Equations::residual(double t, const double* y, const double* y_dot, const J
     const auto [force, torque] = load_at(scene_.loads[i], m, t);
     PlaceForce<double> forces;
     add_force(p, f, m, force, torque, forces);
-    scatter(p, forces, F);
+    scatter(p, forces, y, F);
     power += dot(force, m.r_dot) + dot(torque, m.omega);
   }
   for (size_t i = 0; i < scene_.wheels.size(); ++i) {
@@ -288,11 +297,27 @@ double Equations::potential(const double* y, const JointMemory& memory) const {
     const BodyPlaces& at = places_[i];
     const ReducedBody& body = scene_.bodies[i];
     const Map<const VectorXd> q(y + at.q, at.n);
-    Vector3d mc = body.mc0;
-    if (at.n > 0) mc += body.Ct * q, energy += 0.5 * q.dot(body.Ke * q);
-    energy -= scene_.gravity.dot(body.m * Map<const Vector3d>(y + at.R) + eigen(rotation(y + at.p) * vec3(mc)));
+    if (at.n > 0) energy += 0.5 * q.dot(body.Ke * q);
+    DeformedBody<double>& deformed = scratch_->bodies[i].deformed;
+    deform(prepared_.bodies[i], q.data(), deformed);
+    energy -= scene_.gravity.dot(body.m * Map<const Vector3d>(y + at.R) + eigen(rotation(y + at.p) * deformed.mc));
   }
   return energy;
+}
+
+Equations::Momenta Equations::momenta(size_t i, const double* y) const {
+  const BodyPlaces& at = places_[i];
+  const BodyData& b = prepared_.bodies[i];
+  const Mat3<double> A = rotation(y + at.p);
+  DeformedBody<double>& deformed = scratch_->bodies[i].deformed;
+  Vec3<double> P, H;
+  Momenta of;
+  body_momenta(b, transposed_product(A, three(y + at.v)), three(y + at.w), y + at.q, y + at.u, deformed, P, H,
+               of.kinetic);
+  of.linear = eigen(A * P);
+  of.angular = eigen(A * H);
+  of.first_moment = eigen(A * deformed.mc);
+  return of;
 }
 
 }  // namespace flexboom::redundant

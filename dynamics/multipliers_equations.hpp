@@ -18,6 +18,7 @@ namespace flexboom::redundant {
 /// The same description made ready.
 struct Prepared {
   Multibody scene;
+  std::vector<Stiffening> stiffening;  // per body
   std::vector<BodyData> bodies;
   std::vector<JointData> joints, springs;
   std::vector<PlaceData> loads;
@@ -127,10 +128,17 @@ class Equations {
   /// Motion of the two places of a joint at time t.
   PairMotion<double> pair(const JointData&, double t, const double* y, const Joint*) const;
 
+  struct Momenta {
+    Eigen::Vector3d linear, angular, first_moment;  // about the body's origin, inertial axes
+    double kinetic = 0;                             // [J]
+  };
+  /// Of a body without its wheels.
+  Momenta momenta(size_t body, const double* y) const;
+
  private:
   Frame<double> frame(int body, const double* y) const;
   Elastic<double> elastic(const PlaceData&, const double* y) const;
-  void scatter(const PlaceData&, const PlaceForce<double>&, double* F) const;
+  void scatter(const PlaceData&, const PlaceForce<double>&, const double* y, double* F) const;
   void scatter_correction(const PlaceData&, const PlaceForce<double>&, const double* y, double* F) const;
   RowMultipliers multipliers(const JointData&, const double* y) const;
   void body_residual(size_t i, const double* y, const double* y_dot, double* F);

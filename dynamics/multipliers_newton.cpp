@@ -1,7 +1,6 @@
 #include "dynamics/multipliers_equations.hpp"
 #include "dynamics/multipliers_scratch.hpp"
 #include "dynamics/rotation.hpp"
-#include "reduction/root_loads.hpp"
 
 #include <algorithm>
 #include <numeric>
@@ -110,7 +109,8 @@ struct PairResult {
   Lanes power, loss;
 };
 
-/// Rows: forces on a (R, w, s, phi: 12), on b (12), g, g_dot, power, loss. Columns: directions of a, of b.
+/// Rows: forces on a (R, w, s, phi: 12), on b (12), g, g_dot, power, loss. Columns: directions of a, of b, and the
+/// forces themselves.
 template <class Evaluate>
 MatrixXd pair_derivatives(const JointData& j, const PairMotion<double>& x, bool velocities, const Evaluate& evaluate) {
   std::vector<Direction> directions;
@@ -124,7 +124,7 @@ MatrixXd pair_derivatives(const JointData& j, const PairMotion<double>& x, bool 
     }
   }
   const Index m = static_cast<Index>(j.rows.size());
-  MatrixXd L = MatrixXd::Zero(26 + 2 * m, 2 * side_size);
+  MatrixXd L = MatrixXd::Zero(26 + 2 * m, 2 * side_size + 1);
   const PairMotion<Lanes> base = lifted_pair(x);
   for (size_t first = 0; first < directions.size(); first += 8) {
     const size_t count = std::min<size_t>(8, directions.size() - first);
@@ -145,6 +145,10 @@ MatrixXd pair_derivatives(const JointData& j, const PairMotion<double>& x, bool 
       L(24 + 2 * m, column) = r.power.d[lane];
       L(25 + 2 * m, column) = r.loss.d[lane];
     }
+    Index row = 0;
+    for (PlaceForce<Lanes>* f : {&r.forces.a, &r.forces.b})
+      for (Vec3<Lanes>* v : {&f->R, &f->w, &f->s, &f->phi})
+        for (int c = 0; c < 3; ++c) L(row++, 2 * side_size) = component(*v, c).v;
   }
   for (const Index group : {0, 12}) L.middleCols(group, 3) = -L.middleCols(side_size + group, 3);
   if (!velocities)  // d g_dot / d velocity = dg / d position
@@ -153,18 +157,20 @@ MatrixXd pair_derivatives(const JointData& j, const PairMotion<double>& x, bool 
 }
 
 /// Freedoms [R theta q] -> R, theta, s, phi of a place, 12 x (6 + n).
-MatrixXd freedom_map(const PlaceData& p, Index n) {
+MatrixXd freedom_map(const PlaceData& p, const double* q, Index n) {
   MatrixXd V = MatrixXd::Zero(12, 6 + n);
   V.topLeftCorner(6, 6).setIdentity();
-  if (p.flexible) V.block(6, 6, 3, n) = p.S, V.block(9, 6, 3, n) = p.S_theta;
+  if (!p.flexible) return V;
+  const PlaceShapes shapes = shapes_at(p, q);
+  V.block(6, 6, 3, n) = shapes.S, V.block(9, 6, 3, n) = shapes.S_theta;
   return V;
 }
+
 /// The same from the unknowns [R p q], 12 x (7 + n).
-MatrixXd unknown_map(const PlaceData& p, const double* quaternion, Index n) {
-  MatrixXd V = MatrixXd::Zero(12, 7 + n);
-  V.topLeftCorner(3, 3).setIdentity();
+MatrixXd unknown_map(const MatrixXd& freedoms, const double* quaternion) {
+  MatrixXd V(12, freedoms.cols() + 1);
+  V << freedoms.leftCols(3), MatrixXd::Zero(12, 4), freedoms.rightCols(freedoms.cols() - 6);
   V.block(3, 3, 3, 4) = quaternion_map(quaternion);
-  if (p.flexible) V.block(6, 7, 3, n) = p.S, V.block(9, 7, 3, n) = p.S_theta;
   return V;
 }
 
@@ -172,15 +178,18 @@ MatrixXd unknown_map(const PlaceData& p, const double* quaternion, Index n) {
 
 MatrixXd Equations::mass(size_t i, const double* y) const {
   const BodyPlaces& at = places_[i];
-  const ReducedBody& body = scene_.bodies[i];
-  const auto& [mc, J, Cr] = deformed_inertia(body, Map<const VectorXd>(y + at.q, at.n));
+  const BodyData& body = prepared_.bodies[i];
+  DeformedBody<double>& d = scratch_->bodies[i].deformed;
+  deform(body, y + at.q, d);
   const Matrix3d A = rotation_matrix(Map<const Eigen::Vector4d>(y + at.p));
   MatrixXd M = MatrixXd::Zero(6 + at.n, 6 + at.n);
   M.topLeftCorner<3, 3>() = body.m * Matrix3d::Identity();
-  M.block<3, 3>(3, 0) = tilde(mc) * A.transpose();
-  M.block<3, 3>(3, 3) = J;
-  M.block(6, 0, at.n, 3) = (A * body.Ct).transpose();
-  M.block(6, 3, at.n, 3) = Cr.transpose();
+  M.block<3, 3>(3, 0) = tilde(eigen(d.mc)) * A.transpose();
+  M.block<3, 3>(3, 3) << d.J[0], d.J[3], d.J[5], d.J[3], d.J[1], d.J[4], d.J[5], d.J[4], d.J[2];
+  for (Index k = 0; k < at.n; ++k) {
+    M.block<1, 3>(6 + k, 0) = (A * eigen(d.Ct[static_cast<size_t>(k)])).transpose();
+    M.block<1, 3>(6 + k, 3) = eigen(d.Cr[static_cast<size_t>(k)]).transpose();
+  }
   M.bottomRightCorner(at.n, at.n) = body.Me;
   return M.selfadjointView<Eigen::Lower>();
 }
@@ -224,7 +233,7 @@ void Equations::body_newton(size_t i, double t, double c, const double* y, const
         (d < 6 + n ? s.q[static_cast<size_t>(d - 6)] : s.q_dot[static_cast<size_t>(d - 6 - n)]).d[lane] = 1;
     }
     Vec3<Lanes> on_R, on_w;
-    body_forces(body, x, s.Cr_lanes, on_R, on_w, s.on_q_lanes.data());
+    body_forces(body, x, s.deformed_lanes, on_R, on_w, s.on_q_lanes.data());
     for (Index k = 0; k < count; ++k) {
       const int lane = static_cast<int>(k);
       for (int r = 0; r < 3; ++r) {
@@ -262,14 +271,21 @@ void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velociti
     if (p.body < 0) continue;
     const BodyPlaces& at = places_[static_cast<size_t>(p.body)];
     const Index first = static_cast<Index>(side) * side_size;
-    const MatrixXd E = unknown_map(p, y + at.p, at.n), V = freedom_map(p, at.n);
-    const MatrixXd of_positions = L.middleCols(first, 12) * E;
+    const MatrixXd V = freedom_map(p, y + at.q, at.n), E = unknown_map(V, y + at.p);
+    MatrixXd of_positions = L.middleCols(first, 12) * E;
     const MatrixXd of_velocities = L.middleCols(first + 12, 12) * V;
+    for (const auto& [slope, group] : {std::pair(&p.S_slope, 6), std::pair(&p.theta_slope, 9)})
+      for (const Entry& e : *slope) {  // the shapes change: rates S(q) q_dot, and forces on q
+        const auto c = static_cast<Index>(e.component), k = static_cast<Index>(e.k), l = static_cast<Index>(e.l);
+        of_positions.col(7 + l) += L.col(first + 12 + group + c) * (e.value * y[at.u + k]);
+        const double force = L(12 * static_cast<Index>(side) + group + c, 2 * side_size);
+        out.add(at.u + static_cast<int>(k), at.q + static_cast<int>(l), -e.value * force);
+      }
     for (size_t other = 0; other < 2; ++other) {
       const PlaceData& o = *sides[other];
       if (o.body < 0) continue;
       const BodyPlaces& on = places_[static_cast<size_t>(o.body)];
-      const MatrixXd T = freedom_map(o, on.n).transpose();
+      const MatrixXd T = freedom_map(o, y + on.q, on.n).transpose();
       const Index row = 12 * static_cast<Index>(other);
       out.add_block(on.v, at.R, MatrixXd(-T * of_positions.middleRows(row, 12)));
       if (velocities) out.add_block(on.v, at.v, MatrixXd(-T * of_velocities.middleRows(row, 12)));
@@ -373,7 +389,7 @@ MatrixXd Equations::gradient(double t, const double* y) {
       const PlaceData& p = b ? j.b : j.a;
       if (p.body < 0) continue;
       const BodyPlaces& at = places_[static_cast<size_t>(p.body)];
-      G.block(first, at.freedom, m, 6 + at.n) += L.block(24, b ? side_size : 0, m, 12) * freedom_map(p, at.n);
+      G.block(first, at.freedom, m, 6 + at.n) += L.block(24, b ? side_size : 0, m, 12) * freedom_map(p, y + at.q, at.n);
     }
     first += m;
   }
@@ -399,6 +415,10 @@ void Equations::row_values(double t, const double* y, RowValues& out) {
       const Elastic<double>& e0 = b ? now.elastic_b : now.elastic_a;
       move(f.R, f0.v), move(e.s, e0.s_dot), move(e.phi, e0.phi_dot);
       turn(f.A, f0.w, 0);
+      const PlaceData& p = b ? j.b : j.a;
+      if (!p.flexible) continue;
+      const Elastic<double> bias = elastic_bias(p, y + places_[static_cast<size_t>(p.body)].u);
+      move(e.s_dot, bias.s_dot), move(e.phi_dot, bias.phi_dot);
     }
     for (size_t k = 0; k < joint.prescribed.size(); ++k) {
       x.drive[k].value.d[0] = now.drive[k].rate;

@@ -5,7 +5,10 @@
 #include "dynamics/dual.hpp"
 #include "dynamics/spatial.hpp"
 
+#include <Eigen/Core>
+
 #include <cmath>
+#include <vector>
 
 namespace flexboom::redundant {
 
@@ -64,14 +67,33 @@ struct Elastic {
   Vec3<T> s, phi, s_dot, phi_dot;
 };
 
+/// A non-zero of a matrix of vectors or symmetric tensors, numbered k, l.
+struct Entry {
+  size_t k = 0, l = 0, component = 0;
+  double value = 0;
+};
+
 /// Constants of a place.
 struct PlaceData {
   int body = -1;
   bool flexible = false;
   Vec3<double> position;
-  Mat3<double> axes;            // place -> BRF, undeformed
-  Eigen::Matrix3Xd S, S_theta;  // 3 x n of a flexible place
+  Mat3<double> axes;                        // place -> BRF, undeformed
+  Eigen::Matrix3Xd S, S_theta;              // 3 x n of a flexible place
+  std::vector<Entry> S_slope, theta_slope;  // with geometric stiffness: column k gains this q_l
 };
+
+/// S and S_theta where the body is deformed, 3 x n each.
+struct PlaceShapes {
+  Eigen::Matrix3Xd S, S_theta;
+};
+PlaceShapes shapes_at(const PlaceData&, const double* q);
+
+/// What q and its rates make of a flexible place; all zero of others.
+Elastic<double> elastic_at(const PlaceData&, const double* q, const double* q_dot);
+
+/// Second derivatives of S q and S_theta q that remain when q_ddot is zero.
+Elastic<double> elastic_bias(const PlaceData&, const double* q_dot);
 
 /// Motion of a place, inertial axes.
 template <class T>

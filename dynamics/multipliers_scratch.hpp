@@ -11,12 +11,12 @@
 namespace flexboom::redundant {
 
 struct BodyScratch {
-  std::vector<Vec3<double>> Cr;
+  DeformedBody<double> deformed;
   std::vector<double> on_q;
-  std::vector<Vec3<Lanes>> Cr_lanes;
+  DeformedBody<Lanes> deformed_lanes;
   std::vector<Lanes> q, q_dot, on_q_lanes;
 
-  explicit BodyScratch(size_t n) : Cr(n), on_q(n), Cr_lanes(n), q(n), q_dot(n), on_q_lanes(n) {}
+  explicit BodyScratch(size_t n) : deformed(n), on_q(n), deformed_lanes(n), q(n), q_dot(n), on_q_lanes(n) {}
 };
 
 struct EquationScratch {

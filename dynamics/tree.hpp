@@ -13,9 +13,6 @@
 
 namespace flexboom {
 
-/// Is the geometric stiffness of a body in the equations? `Tree::stiffening_effect` tells its size.
-enum class Stiffening { off, on };
-
 /// What a joint has at an instant, as far as its kind has it.
 struct JointState {
   std::vector<double> coordinate;                      // angles [rad], length [m]

@@ -165,7 +165,7 @@ inertia = [0.1, 0.12, 0.05]
 centre = [0, 0, 0.1]
 [[bodies]]
 name = "arm"
-stiffening = "off"
+stiffening = "on"
 modes = 2
 damping = { rule = "modal", value = 0.02 }
 [[bodies.segments]]

@@ -1,3 +1,4 @@
+#include "dynamics/formulations.hpp"
 #include "dynamics/multipliers_equations.hpp"
 #include "dynamics/multipliers_start.hpp"
 #include "dynamics/rotation.hpp"
@@ -93,9 +94,31 @@ redundant::JointMemory closed_stops(size_t joints) {
   return {std::vector<char>(joints, 1), std::vector<double>(joints, 0.0)};
 }
 
-TEST(Multipliers, NewtonMatrixAgreesWithCentralDifferences) {
+/// Kg that mean nothing, for every load.
+void add_geometric_stiffness(Everything& c) {
+  for (ReducedBody& b : c.scene.bodies) {
+    const auto matrices = [&](size_t count) {
+      std::vector<MatrixXd> K(count);
+      for (MatrixXd& k : K) {
+        k = MatrixXd::NullaryExpr(b.n(), b.n(), [&] { return 0.3 * c.noise(); });
+        k = (k + k.transpose()).eval();
+      }
+      return K;
+    };
+    if (b.n() == 0) continue;
+    b.Kg.spin = matrices(6), b.Kg.acceleration = matrices(3), b.Kg.angular_acceleration = matrices(3);
+    for (const Marker& m : b.markers) b.Kg.markers.push_back({m.name, matrices(3), matrices(3)});
+  }
+}
+
+class NewtonMatrix : public ::testing::TestWithParam<Stiffening> {};
+INSTANTIATE_TEST_SUITE_P(Multipliers, NewtonMatrix, ::testing::Values(Stiffening::off, Stiffening::on),
+                         [](const auto& p) { return p.param == Stiffening::on ? "stiffened" : "plain"; });
+
+TEST_P(NewtonMatrix, AgreesWithCentralDifferences) {
   Everything c;
-  const Multipliers system(c.scene);
+  add_geometric_stiffness(c);
+  const Multipliers system(c.scene, {GetParam()});
   redundant::Equations e(system.impl());
   const VectorXd y = c.random_state(e, true), y_dot = VectorXd::NullaryExpr(e.size(), [&] { return c.noise(); });
   const redundant::JointMemory memory = closed_stops(c.scene.joints.size());
@@ -190,6 +213,44 @@ TEST(Multipliers, AccelerationsAgreeWithVirtualPowerOverPointMasses) {
   const VectorXd x = K.lu().solve(b);
   for (const redundant::BodyPlaces& p : e.places())
     EXPECT_LT((x.segment(p.freedom, 6 + p.n) - y_dot.segment(p.v, 6 + p.n)).norm(), 1e-6 * x.head(n).norm());
+}
+
+/// Geometric stiffness in every term: the tree has its own kinematics, and its own tests by virtual power.
+TEST(Multipliers, StiffenedAccelerationsAreThoseOfTheTree) {
+  Everything c;
+  add_geometric_stiffness(c);
+  c.scene.joints.pop_back();  // the loop
+  c.scene.wheels.clear();
+  const double t = 0.2;
+  const Tree tree(c.scene, {Stiffening::on});
+  TreeState s = tree.at_rest();
+  for (JointState& j : s.joints) {
+    for (double& x : j.coordinate) x = 0.3 * c.noise();
+    for (double& x : j.rate) x = c.noise();
+    j.omega = c.vector(), j.velocity = c.vector();
+    j.attitude = Eigen::Vector4d(1, c.noise(), c.noise(), c.noise()).normalized();
+  }
+  for (VectorXd& q : s.q) q = 0.2 * VectorXd::NullaryExpr(q.size(), [&] { return c.noise(); });
+  for (VectorXd& q_dot : s.q_dot) q_dot = VectorXd::NullaryExpr(q_dot.size(), [&] { return c.noise(); });
+  VectorXd y = tree.pack(s), y_dot(y.size());
+  tree.impose(t, y);
+  const std::vector<char> open(c.scene.joints.size(), 0);
+  tree.derivative(t, y.data(), open, *tree.workspace(), y_dot.data());
+
+  const Multipliers system(c.scene, {Stiffening::on});
+  redundant::Equations e(system.impl());
+  redundant::JointMemory memory{open, {}};
+  for (size_t i = 0; i < s.joints.size(); ++i)
+    memory.near.push_back(
+        s.joints[i].coordinate.empty() ? 0.0 : s.joints[i].coordinate[0] - c.scene.joints[i].mechanism.threshold);
+  VectorXd z = VectorXd::Zero(e.size()), z_dot;
+  z = e.pack(body_states(tree, t, y));
+  e.make_consistent(t, z, z_dot, memory);
+  for (size_t i = 0; i < c.scene.bodies.size(); ++i) {
+    const redundant::BodyPlaces& at = e.places()[i];
+    const VectorXd wanted = y_dot.segment(tree.layout().rate(tree.layout().q[i]), at.n);
+    EXPECT_LT((z_dot.segment(at.u, at.n) - wanted).norm(), 1e-10 * y_dot.norm()) << i;
+  }
 }
 
 }  // namespace
