@@ -6,10 +6,8 @@
 #include "fem/check.hpp"
 
 #include <cvode/cvode.h>
-#include <fmt/format.h>
 #include <nvector/nvector_serial.h>
 
-#include <cstdlib>
 #include <utility>
 
 namespace flexboom {
@@ -95,9 +93,7 @@ class CvodeStepper final : public Stepper {
       CVodeGetCurrentTime(cvode_, &t);
       CVodeGetLastStep(cvode_, &h);
     }
-    std::unique_ptr<char, decltype(&std::free)> name(CVodeGetReturnFlagName(flag), &std::free);
-    throw NumericalError(
-        fmt::format("CVODE: {} returned {} at t = {:.9g} s, last step {:.3g} s", function, name.get(), t, h));
+    sundials::fail("CVODE", function, CVodeGetReturnFlagName(flag), t, h);
   }
 
   void add_counts(StepCounts& c) const {

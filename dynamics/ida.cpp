@@ -14,7 +14,6 @@
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <exception>
 #include <utility>
 
@@ -85,9 +84,7 @@ struct Ida::Impl {
       IDAGetCurrentTime(ida, &t);
       IDAGetLastStep(ida, &h);
     }
-    std::unique_ptr<char, decltype(&std::free)> name(IDAGetReturnFlagName(flag), &std::free);
-    throw NumericalError(
-        fmt::format("IDA: {} returned {} at t = {:.9g} s, last step {:.3g} s", function, name.get(), t, h));
+    sundials::fail("IDA", function, IDAGetReturnFlagName(flag), t, h);
   }
 
   template <class Call>

@@ -38,11 +38,6 @@ struct DeformedBody {
 };
 
 template <class T>
-T& component_of(Vec3<T>& v, size_t i) {
-  return i == 0 ? v.x : i == 1 ? v.y : v.z;
-}
-
-template <class T>
 void deform(const BodyData& b, const T* q, DeformedBody<T>& d) {
   d.mc = {T(b.mc0.x), T(b.mc0.y), T(b.mc0.z)};
   d.J = {T(b.J0.xx), T(b.J0.yy), T(b.J0.zz), T(b.J0.xy), T(b.J0.yz), T(b.J0.zx)};

@@ -10,6 +10,9 @@
 #include <sundials/sundials_nonlinearsolver.h>
 #include <sundials/sundials_nvector.h>
 
+#include <fmt/format.h>
+
+#include <cstdlib>
 #include <memory>
 
 namespace flexboom::sundials {
@@ -34,6 +37,13 @@ struct Context {
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
 };
+
+/// @throws NumericalError always. `flag_name` is what a library calls its flag: from malloc, freed here.
+[[noreturn]] inline void fail(const char* library, const char* function, char* flag_name, double t, double h) {
+  const std::unique_ptr<char, decltype(&std::free)> name(flag_name, &std::free);
+  throw NumericalError(
+      fmt::format("{}: {} returned {} at t = {:.9g} s, last step {:.3g} s", library, function, name.get(), t, h));
+}
 
 /// An error handler that says nothing: what fails is thrown.
 inline void quiet(int, const char*, const char*, char*, void*) noexcept {}
