@@ -30,7 +30,10 @@ Equations::Equations(const Prepared& prepared) : prepared_(prepared), scene_(pre
     const Index at = places_[i].freedom;
     inverse_metric_.segment<3>(at).setConstant(1 / b.m);
     inverse_metric_.segment<3>(at + 3).setConstant(3 / (b.J0.xx + b.J0.yy + b.J0.zz));
-    inverse_metric_.segment(at + 6, places_[i].n) = b.Me.diagonal().cwiseInverse();
+    // Stiff coordinates leave the corrections to the rigid motion: an error of the method on them is large at once.
+    constexpr double slow = 10;  // [rad/s]
+    inverse_metric_.segment(at + 6, places_[i].n) =
+        (b.Me.diagonal() + b.Ke.diagonal() / (slow * slow)).cwiseInverse();
   }
   for (const JointData& j : joints_) all_rows_ += static_cast<int>(j.rows.size());
   keep_rows(std::vector<char>(static_cast<size_t>(all_rows_), 1));
