@@ -20,7 +20,7 @@ using namespace redundant;
 namespace {
 
 /// Part of the tolerance wanted over a run that each step is asked for.
-constexpr double local_share = 0.02;
+constexpr double local_share = 0.015;
 /// A violation of a joint at the start beyond this [m, rad, their rates] is the caller's mistake.
 constexpr double open_joint = 1e-8;
 
