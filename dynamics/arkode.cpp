@@ -89,18 +89,18 @@ class Arkode {
   }
 
  private:
-  static int linear_system(realtype t, N_Vector y, N_Vector, SUNMatrix, SUNMatrix, booleantype jacobian_is_current,
-                           booleantype* jacobian_was_updated, realtype gamma, void* problem, N_Vector, N_Vector,
-                           N_Vector) noexcept {
-    return sundials::Problem::linear_system(t, y, jacobian_is_current, jacobian_was_updated, gamma, problem);
-  }
-
   void check(int flag, const char* function) const {
     if (flag >= 0) return;
     realtype t = 0, h = 0;
     ARKStepGetCurrentTime(arkode_, &t);
     ARKStepGetLastStep(arkode_, &h);
     sundials::fail("ARKODE", function, ARKStepGetReturnFlagName(flag), t, h);
+  }
+
+  static int linear_system(realtype t, N_Vector y, N_Vector, SUNMatrix, SUNMatrix, booleantype jacobian_is_current,
+                           booleantype* jacobian_was_updated, realtype gamma, void* problem, N_Vector, N_Vector,
+                           N_Vector) noexcept {
+    return sundials::Problem::linear_system(t, y, jacobian_is_current, jacobian_was_updated, gamma, problem);
   }
 
   sundials::Context context_;

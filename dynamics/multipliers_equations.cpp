@@ -32,8 +32,7 @@ Equations::Equations(const Prepared& prepared) : prepared_(prepared), scene_(pre
     inverse_metric_.segment<3>(at + 3).setConstant(3 / (b.J0.xx + b.J0.yy + b.J0.zz));
     // Stiff coordinates leave the corrections to the rigid motion: an error of the method on them is large at once.
     constexpr double slow = 10;  // [rad/s]
-    inverse_metric_.segment(at + 6, places_[i].n) =
-        (b.Me.diagonal() + b.Ke.diagonal() / (slow * slow)).cwiseInverse();
+    inverse_metric_.segment(at + 6, places_[i].n) = (b.Me.diagonal() + b.Ke.diagonal() / (slow * slow)).cwiseInverse();
   }
   for (const JointData& j : joints_) all_rows_ += static_cast<int>(j.rows.size());
   keep_rows(std::vector<char>(static_cast<size_t>(all_rows_), 1));
