@@ -231,6 +231,7 @@ int run_line(int argc, char** argv) {
 int main(int argc, char** argv) {
   restart_with_better_blas_kernels(argv);
   keep_freed_memory();
+  factors_on_huge_pages();
   std::signal(SIGPIPE, SIG_IGN);
 #ifdef SIGXFSZ
   std::signal(SIGXFSZ, SIG_IGN);  // a full quota is an error of write(), not a death
