@@ -1,6 +1,7 @@
 #pragma once
 
 #include "dynamics/equations.hpp"
+#include "reduction/reduced_body.hpp"
 
 namespace flexboom {
 

@@ -1,15 +1,13 @@
 #pragma once
 
-// The equations of motion of a hub with hinged flexible bodies, written once for a scalar T (README, "Equations of
-// motion"). Internal to `dynamics`.
+// The equations of one flexible body on a hinge, written once for constants C (of one body, or of four side by side)
+// and a scalar T: C, or C with derivatives (README, "Equations of motion"). Internal to `dynamics`.
 
 #include "dynamics/dual.hpp"
 #include "dynamics/gravity_terms.hpp"
 #include "dynamics/spatial.hpp"
-#include "dynamics/system.hpp"
 
 #include <cmath>
-#include <span>
 #include <type_traits>
 #include <vector>
 
@@ -17,43 +15,38 @@ namespace flexboom::equations {
 
 /// One non-zero of J1 (component: xx, yy, zz, xy, yz, zx), J2 (the same) or Cr1 (component: x, y, z). A straight boom
 /// that bends in one plane has a handful, a general body n^2 times six: the loops run over what the body has.
-struct Term {
+template <class C>
+struct TermOf {
   int k = 0, l = 0, component = 0;
-  double value = 0;
+  C value = 0;
 };
+using Term = TermOf<double>;
 
 /// Constants of one appendage, packed for the inner loop. Arrays over modes are contiguous.
-struct Body {
+template <class C>
+struct BodyOf {
   int n = 0;
-  double m = 0;
-  Vec3<double> mc0;
-  Sym3<double> J0;
-  std::vector<Vec3<double>> Ct, Cr0;  // n
-  std::vector<Term> Cr1, J1, J2;      // non-zeros
-  std::vector<double> Ke, De;         // n x n
-  std::vector<double> Me_inverse;     // n x n
-  bool diagonal = false;              // Ke, De and Me are diagonal: modes, no constraint shapes
-  std::vector<Vec3<double>> Gt;       // Me^-1 Ct^T, n
-  Sym3<double> Ctt;                   // Ct Me^-1 Ct^T
+  C m = 0;
+  Vec3<C> mc0;
+  Sym3<C> J0;
+  std::vector<Vec3<C>> Ct, Cr0;        // n
+  std::vector<TermOf<C>> Cr1, J1, J2;  // non-zeros
+  std::vector<C> Ke, De;               // n x n
+  std::vector<C> Me_inverse;           // n x n
+  bool diagonal = false;               // Ke, De and Me are diagonal: modes, no constraint shapes
+  std::vector<Vec3<C>> Gt;             // Me^-1 Ct^T, n
+  Sym3<C> Ctt;                         // Ct Me^-1 Ct^T
 
   size_t row_begin(size_t k) const { return diagonal ? k : 0; }
   size_t row_end(size_t k) const { return diagonal ? k + 1 : static_cast<size_t>(n); }
 
-  Vec3<double> d;  // hinge point, hub axes
-  Mat3<double> B;  // columns stowed, outward, stowed x outward: boom axes at Theta = 0 -> hub axes
-  double cos_threshold = 0, sin_threshold = 0;
-  double stiffness = 0, preload = 0;  // spring torque = preload - stiffness Delta
-  double damping = 0, stop_stiffness = 0;
-  int at = 0;  // first entry in p
+  Vec3<C> d;  // hinge point, hub axes
+  Mat3<C> B;  // columns stowed, outward, stowed x outward: boom axes at Theta = 0 -> hub axes
+  C cos_threshold = 0, sin_threshold = 0;
+  C stiffness = 0, preload = 0;  // spring torque = preload - stiffness Delta
+  C damping = 0, stop_stiffness = 0;
 };
-
-struct Model {
-  double hub_m = 0;
-  Vec3<double> hub_mc;
-  Sym3<double> hub_J;
-  bool fixed_hub = false;
-  std::vector<Body> bodies;
-};
+using Body = BodyOf<double>;
 
 /// Quantities of one body that the second sweep needs again.
 template <class T>
@@ -64,22 +57,9 @@ struct BodyScratch {
   std::vector<T> b, g;      // modal force and Me^-1 of it, n
   Vec3<T> t0, w0;           // hinge row after elimination of q
   T b0{}, inverse_J_left{};
-  GravityLoad gravity;  // in a field only
-};
+  GravityLoad<T> gravity;  // in a field only
 
-template <class T>
-struct Scratch {
-  std::vector<BodyScratch<T>> bodies;
-
-  explicit Scratch(const Model& model) : bodies(model.bodies.size()) {
-    for (size_t i = 0; i < bodies.size(); ++i) {
-      const auto n = static_cast<size_t>(model.bodies[i].n);
-      bodies[i].Cr.resize(n);
-      bodies[i].Gw.resize(n);
-      bodies[i].b.resize(n);
-      bodies[i].g.resize(n);
-    }
-  }
+  explicit BodyScratch(size_t n = 0) : Cr(n), Gw(n), b(n), g(n) {}
 };
 
 /// Mass matrix (symmetric, in blocks of translation and rotation) and force of the hub with everything condensed to it,
@@ -98,20 +78,13 @@ struct HubSystem {
 };
 
 /// A constant as a number with derivatives.
-template <class T>
-Vec3<T> lift(const Vec3<double>& a) {
+template <class T, class C>
+Vec3<T> lift(const Vec3<C>& a) {
   return {T(a.x), T(a.y), T(a.z)};
 }
-template <class T>
-HubSystem<T> lift(const HubSystem<double>& h) {
-  const auto symmetric = [](const Sym3<double>& a) {
-    return Sym3<T>{T(a.xx), T(a.yy), T(a.zz), T(a.xy), T(a.yz), T(a.zx)};
-  };
-  return {symmetric(h.tt),
-          symmetric(h.ww),
-          {{lift<T>(h.tw.row[0]), lift<T>(h.tw.row[1]), lift<T>(h.tw.row[2])}},
-          lift<T>(h.ft),
-          lift<T>(h.fw)};
+template <class T, class C>
+Sym3<T> lift(const Sym3<C>& a) {
+  return {T(a.xx), T(a.yy), T(a.zz), T(a.xy), T(a.yz), T(a.zx)};
 }
 
 /// A (v) A^T of a symmetric matrix.
@@ -145,8 +118,8 @@ void subtract_product(Mat3<T>& a, const Vec3<S>& u, const Vec3<T>& v) {
 }
 
 /// Boom axes -> hub axes at gap Delta: B Rz(threshold + Delta).
-template <class T>
-Mat3<T> boom_axes(const Body& body, const T& gap) {
+template <class C, class T>
+Mat3<T> boom_axes(const BodyOf<C>& body, const T& gap) {
   using std::cos;
   using std::sin;
   const T cd = cos(gap), sd = sin(gap);
@@ -154,29 +127,17 @@ Mat3<T> boom_axes(const Body& body, const T& gap) {
   const T s = body.sin_threshold * cd + body.cos_threshold * sd;
   Mat3<T> A;
   for (size_t i = 0; i < 3; ++i) {
-    const Vec3<double>& b = body.B.row[i];
+    const Vec3<C>& b = body.B.row[i];
     A.row[i] = {b.x * c + b.y * s, b.y * c - b.x * s, T(b.z)};
   }
   return A;
 }
 
-/// Torque of the hinge along +Theta (eqs. 16-19).
-template <class T>
-T hinge_torque(const Body& body, const T& gap, const T& rate, bool contact) {
-  const double k = body.stiffness + (contact ? body.stop_stiffness : 0.0);
+/// Torque of the hinge along +Theta (eqs. 16-19). `closed`: 1 where the stop is, else 0.
+template <class C, class T>
+T hinge_torque(const BodyOf<C>& body, const T& gap, const T& rate, const C& closed) {
+  const C k = body.stiffness + closed * body.stop_stiffness;
   return body.preload - k * gap - body.damping * rate;
-}
-
-/// Component of a symmetric matrix or a vector by its number in Term.
-template <class T>
-T& component(Sym3<T>& a, int i) {
-  T* const entries[] = {&a.xx, &a.yy, &a.zz, &a.xy, &a.yz, &a.zx};
-  return *entries[i];
-}
-template <class T>
-T& component(Vec3<T>& a, int i) {
-  T* const entries[] = {&a.x, &a.y, &a.z};
-  return *entries[i];
 }
 
 /// Inertia of the deformed body: mc(q), J(q), Jdot; Cr(q) goes to the scratch.
@@ -186,21 +147,21 @@ struct Inertia {
   Sym3<T> J, J_dot;
 };
 
-template <class T>
-Inertia<T> inertia_at(const Body& body, const T* q, const T* q_dot, BodyScratch<T>& s) {
+template <class C, class T>
+Inertia<T> inertia_at(const BodyOf<C>& body, const T* q, const T* q_dot, BodyScratch<T>& s) {
   Inertia<T> r;
-  r.mc = {T(body.mc0.x), T(body.mc0.y), T(body.mc0.z)};
-  r.J = {T(body.J0.xx), T(body.J0.yy), T(body.J0.zz), T(body.J0.xy), T(body.J0.yz), T(body.J0.zx)};
+  r.mc = lift<T>(body.mc0);
+  r.J = lift<T>(body.J0);
   for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) {
     r.mc += q[k] * body.Ct[k];
-    s.Cr[k] = {T(body.Cr0[k].x), T(body.Cr0[k].y), T(body.Cr0[k].z)};
+    s.Cr[k] = lift<T>(body.Cr0[k]);
   }
-  for (const Term& t : body.Cr1) component(s.Cr[static_cast<size_t>(t.l)], t.component) += t.value * q[t.k];
-  for (const Term& t : body.J1) {
+  for (const TermOf<C>& t : body.Cr1) component(s.Cr[static_cast<size_t>(t.l)], t.component) += t.value * q[t.k];
+  for (const TermOf<C>& t : body.J1) {
     component(r.J, t.component) += t.value * q[t.k];
     component(r.J_dot, t.component) += t.value * q_dot[t.k];
   }
-  for (const Term& t : body.J2) {  // symmetric in k, l: d/dt(q_k q_l) summed over both is 2 q_dot_k q_l
+  for (const TermOf<C>& t : body.J2) {  // symmetric in k, l: d/dt(q_k q_l) summed over both is 2 q_dot_k q_l
     const T vq = t.value * q[t.l];
     component(r.J, t.component) += vq * q[t.k];
     component(r.J_dot, t.component) += 2.0 * (vq * q_dot[t.k]);
@@ -209,8 +170,8 @@ Inertia<T> inertia_at(const Body& body, const T* q, const T* q_dot, BodyScratch<
 }
 
 /// Modal forces Q_f - Ke q - De q_dot (FORMULATION 3.1) of one body with angular velocity w in its own axes.
-template <class T>
-void modal_forces(const Body& body, const Vec3<T>& w, const T* q, const T* q_dot, BodyScratch<T>& s) {
+template <class C, class T>
+void modal_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q, const T* q_dot, BodyScratch<T>& s) {
   const auto n = static_cast<size_t>(body.n);
   for (size_t k = 0; k < n; ++k) {
     T f = T(0.0);
@@ -220,28 +181,30 @@ void modal_forces(const Body& body, const Vec3<T>& w, const T* q, const T* q_dot
   }
   // 1/2 w^T dJ/dq_k w + 2 w . (Cr1[k] q_dot)
   const T ww[] = {w.x * w.x, w.y * w.y, w.z * w.z, 2.0 * (w.x * w.y), 2.0 * (w.y * w.z), 2.0 * (w.z * w.x)};
-  for (const Term& t : body.J1) s.b[static_cast<size_t>(t.k)] += (0.5 * t.value) * ww[t.component];
-  for (const Term& t : body.J2) s.b[static_cast<size_t>(t.k)] += t.value * (q[t.l] * ww[t.component]);
+  for (const TermOf<C>& t : body.J1) s.b[static_cast<size_t>(t.k)] += (0.5 * t.value) * ww[t.component];
+  for (const TermOf<C>& t : body.J2) s.b[static_cast<size_t>(t.k)] += t.value * (q[t.l] * ww[t.component]);
   const T* const wi[] = {&w.x, &w.y, &w.z};
-  for (const Term& t : body.Cr1) s.b[static_cast<size_t>(t.k)] += (2.0 * t.value) * (*wi[t.component] * q_dot[t.l]);
+  for (const TermOf<C>& t : body.Cr1)
+    s.b[static_cast<size_t>(t.k)] += (2.0 * t.value) * (*wi[t.component] * q_dot[t.l]);
 }
 
 /// Adds gravity to force, torque and modal forces (`s.b`) of one body in its own axes: m a + G mc, mc x a + axial(G J),
 /// Ct^T a - 1/2 G : dJ/dq_k. `field`: about the hub's origin, hub axes; w: of the body; Ct_rate = Ct q_dot.
-inline void add_gravity(const Body& body, const Gravity& field, const Vec3<double>& w_hub, const Vec3<double>& w,
-                        const double* q, const Inertia<double>& inertia, const Vec3<double>& Ct_rate,
-                        BodyScratch<double>& s, Vec3<double>& ft, Vec3<double>& fw) {
-  const Gravity here = field.at(body.d, s.A);
-  const Vec3<double>& a = here.acceleration;
-  const Sym3<double>& G = here.gradient;
-  const Vec3<double> force = body.m * a + G * inertia.mc;
-  const Vec3<double> torque = cross(inertia.mc, a) + gradient_torque(G, inertia.J);
+template <class C>
+void add_gravity(const BodyOf<C>& body, const Gravity<double>& field, const Vec3<C>& w_hub, const Vec3<C>& w,
+                 const C* q, const Inertia<C>& inertia, const Vec3<C>& Ct_rate, BodyScratch<C>& s, Vec3<C>& ft,
+                 Vec3<C>& fw) {
+  const Gravity<C> here = field.at(body.d, s.A);
+  const Vec3<C>& a = here.acceleration;
+  const Sym3<C>& G = here.gradient;
+  const Vec3<C> force = body.m * a + G * inertia.mc;
+  const Vec3<C> torque = cross(inertia.mc, a) + gradient_torque(G, inertia.J);
   ft += force;
   fw += torque;
-  const double g[] = {G.xx, G.yy, G.zz, 2 * G.xy, 2 * G.yz, 2 * G.zx};
+  const C g[] = {G.xx, G.yy, G.zz, 2.0 * G.xy, 2.0 * G.yz, 2.0 * G.zx};
   for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) s.b[k] += dot(body.Ct[k], a);
-  for (const Term& t : body.J1) s.b[static_cast<size_t>(t.k)] -= 0.5 * t.value * g[t.component];
-  for (const Term& t : body.J2) s.b[static_cast<size_t>(t.k)] -= t.value * q[t.l] * g[t.component];
+  for (const TermOf<C>& t : body.J1) s.b[static_cast<size_t>(t.k)] -= 0.5 * t.value * g[t.component];
+  for (const TermOf<C>& t : body.J2) s.b[static_cast<size_t>(t.k)] -= t.value * q[t.l] * g[t.component];
   s.gravity.force = s.A * force;
   s.gravity.power = dot(s.gravity.force, cross(w_hub, body.d)) + dot(torque, w) + dot(a, Ct_rate) -
                     0.5 * contraction(G, inertia.J_dot);
@@ -249,9 +212,9 @@ inline void add_gravity(const Body& body, const Gravity& field, const Vec3<doubl
 
 /// First sweep: one body's equations at its own frame acceleration (a, alpha), with q_ddot and Delta_ddot eliminated,
 /// added to the hub's. `field`: gravity about the hub's origin, hub axes, or null; of values only, not of derivatives.
-template <class T>
-void condense(const Body& body, const Vec3<T>& w_hub, const T* p, const T* u, bool contact, BodyScratch<T>& s,
-              bool fixed_hub, HubSystem<T>& hub, [[maybe_unused]] const Gravity* field = nullptr) {
+template <class C, class T>
+void condense(const BodyOf<C>& body, const Vec3<T>& w_hub, const T* p, const T* u, const C& closed, BodyScratch<T>& s,
+              bool fixed_hub, HubSystem<T>& hub, [[maybe_unused]] const Gravity<double>* field = nullptr) {
   const auto n = static_cast<size_t>(body.n);
   const T* q = p + 1;
   const T* q_dot = u + 1;
@@ -279,13 +242,13 @@ void condense(const Body& body, const Vec3<T>& w_hub, const T* p, const T* u, bo
   Vec3<T> fw =
       -(cross(w, inertia.J * w + Cr_rate) + inertia.J_dot * w + cross(inertia.mc, a_bias) + inertia.J * alpha_bias);
 
-  if constexpr (std::is_same_v<T, double>)
+  if constexpr (std::is_same_v<T, C>)
     if (field) add_gravity(body, *field, w_hub, w, q, inertia, Ct_rate, s, ft, fw);
 
   // Eliminate q_ddot, then Delta_ddot.
   s.t0 = {-inertia.mc.y, inertia.mc.x, T(0.0)};
   s.w0 = {inertia.J.zx, inertia.J.yz, inertia.J.zz};
-  s.b0 = fw.z + hinge_torque(body, p[0], rate, contact);
+  s.b0 = fw.z + hinge_torque(body, p[0], rate, closed);
   T J_left = inertia.J.zz;
   for (size_t k = 0; k < n; ++k) {
     s.Gw[k] = Vec3<T>{};
@@ -342,7 +305,7 @@ void condense(const Body& body, const Vec3<T>& w_hub, const T* p, const T* u, bo
   }
   // ww gains d~ tw + (d~ tw)^T - d~ tt d~ = d~ tw' + (d~ tw)^T with tw' = tw - tt d~, and (d~ tw)^T = -tw^T d~.
   // Column j of tw is (row0_j, row1_j, row2_j); (d~ X)_{ij} = (d x column_j)_i.
-  const Vec3<double>& d = body.d;
+  const Vec3<C>& d = body.d;
   const auto shift = [&d](const Mat3<T>& X) {
     return Mat3<T>{{d.y * X.row[2] - d.z * X.row[1], d.z * X.row[0] - d.x * X.row[2], d.x * X.row[1] - d.y * X.row[0]}};
   };
@@ -380,78 +343,25 @@ void solve_hub(const HubSystem<T>& h, Vec3<T>& a, Vec3<T>& alpha) {
   alpha = {x[3], x[4], x[5]};
 }
 
-/// The hub alone, before any body is added: mass matrix, and force at angular velocity w.
-template <class T>
-HubSystem<T> bare_hub(const Model& model, const Vec3<T>& w) {
-  const Vec3<double>& c = model.hub_mc;
-  const Sym3<double>& J = model.hub_J;
-  const T zero(0.0);
-  HubSystem<T> hub;
-  hub.tt = {T(model.hub_m), T(model.hub_m), T(model.hub_m), zero, zero, zero};
-  hub.tw = {{Vec3<T>{zero, T(c.z), T(-c.y)}, Vec3<T>{T(-c.z), zero, T(c.x)}, Vec3<T>{T(c.y), T(-c.x), zero}}};
-  hub.ww = {T(J.xx), T(J.yy), T(J.zz), T(J.xy), T(J.yz), T(J.zx)};
-  hub.ft = -cross(w, cross(w, c));
-  hub.fw = -cross(w, J * w);
-  return hub;
-}
-
-/// Force and torque of gravity on the hub alone, about its origin, hub axes.
-struct GravityOnHub {
-  Vec3<double> force, torque;
-};
-inline GravityOnHub gravity_on_hub(const Model& model, const Gravity& field) {
-  return {model.hub_m * field.acceleration + field.gradient * model.hub_mc,
-          cross(model.hub_mc, field.acceleration) + gradient_torque(field.gradient, model.hub_J)};
-}
-
-/// Second sweep: Delta_ddot and q_ddot of one body from the accelerations of the hub. S may be double where T is Dual:
-/// a body whose own state is held constant.
-template <class S, class T>
-void release(const Body& body, const BodyScratch<S>& s, const Vec3<T>& a_hub, const Vec3<T>& alpha_hub, T* out) {
-  const Vec3<T> a = transposed_product(s.A, a_hub - cross(body.d, alpha_hub));
+/// Second sweep: what accelerations of the hub add to Delta_ddot and q_ddot of one body.
+template <class C, class T>
+void respond(const BodyOf<C>& body, const BodyScratch<T>& s, const Vec3<double>& a_hub, const Vec3<double>& alpha_hub,
+             T* out) {
+  const Vec3<T> a = transposed_product(s.A, lift<C>(a_hub) - cross(body.d, alpha_hub));
   Vec3<T> alpha = transposed_product(s.A, alpha_hub);
-  out[0] = (s.b0 - (dot(s.t0, a) + dot(s.w0, alpha))) * s.inverse_J_left;
+  out[0] = -((dot(s.t0, a) + dot(s.w0, alpha)) * s.inverse_J_left);
   alpha.z += out[0];
-  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k)
-    out[1 + k] = s.g[k] - (dot(body.Gt[k], a) + dot(s.Gw[k], alpha));
+  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) out[1 + k] = -(dot(body.Gt[k], a) + dot(s.Gw[k], alpha));
 }
 
-/// u_dot and the acceleration of the hub's origin in hub axes, from p = (Delta, q)... and u = (omega, Delta_dot,
-/// q_dot...). `field`: gravity about the hub's origin, hub axes, or null.
-template <class T>
-void accelerations(const Model& model, const T* p, const T* u, std::span<const char> contact, Scratch<T>& scratch,
-                   T* u_dot, Vec3<T>& a_hub, [[maybe_unused]] const Gravity* field = nullptr) {
-  const int base = model.fixed_hub ? 0 : 3;
-  const Vec3<T> w_hub = model.fixed_hub ? Vec3<T>{} : Vec3<T>{u[0], u[1], u[2]};
-  HubSystem<T> hub = bare_hub(model, w_hub);
-  if constexpr (std::is_same_v<T, double>)
-    if (field) {
-      const GravityOnHub g = gravity_on_hub(model, *field);
-      hub.ft += g.force, hub.fw += g.torque;
-    }
-  for (size_t i = 0; i < model.bodies.size(); ++i) {
-    const Body& body = model.bodies[i];
-    condense(body, w_hub, p + body.at, u + base + body.at, contact[i] != 0, scratch.bodies[i], model.fixed_hub, hub,
-             field);
-  }
-  a_hub = Vec3<T>{};
-  Vec3<T> alpha_hub{};
-  if (!model.fixed_hub) {
-    solve_hub(hub, a_hub, alpha_hub);
-    u_dot[0] = alpha_hub.x, u_dot[1] = alpha_hub.y, u_dot[2] = alpha_hub.z;
-  }
-  for (size_t i = 0; i < model.bodies.size(); ++i)
-    release(model.bodies[i], scratch.bodies[i], a_hub, alpha_hub, u_dot + base + model.bodies[i].at);
-}
-
-/// Power of gravity on hub and bodies [W] with the loads that `accelerations` left in the scratch; v, w: of the hub,
-/// hub axes.
-inline double gravity_power(const Model& model, const Gravity& field, const Scratch<double>& scratch,
-                            const Vec3<double>& v, const Vec3<double>& w) {
-  const GravityOnHub hub = gravity_on_hub(model, field);
-  double power = dot(hub.force, v) + dot(hub.torque, w);
-  for (const BodyScratch<double>& s : scratch.bodies) power += dot(s.gravity.force, v) + s.gravity.power;
-  return power;
+/// Second sweep: Delta_ddot and q_ddot of one body from the accelerations of the hub.
+template <class C, class T>
+void release(const BodyOf<C>& body, const BodyScratch<T>& s, const Vec3<double>& a_hub, const Vec3<double>& alpha_hub,
+             T* out) {
+  respond(body, s, a_hub, alpha_hub, out);
+  const T own = s.b0 * s.inverse_J_left;
+  out[0] += own;
+  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) out[1 + k] += s.g[k] - own * s.Gw[k].z;
 }
 
 }  // namespace flexboom::equations

@@ -8,14 +8,12 @@
 
 namespace flexboom {
 
-void check_hub_inertia(const equations::Model& model) {
-  equations::Scratch<double> scratch(model);
-  equations::HubSystem<double> hub = equations::bare_hub(model, spatial::Vec3<double>{});
-  for (size_t i = 0; i < model.bodies.size(); ++i) {
-    const equations::Body& body = model.bodies[i];
-    const std::vector<double> rest(static_cast<size_t>(1 + body.n), 0.0);
-    equations::condense(body, spatial::Vec3<double>{}, rest.data(), rest.data(), false, scratch.bodies[i], false, hub);
-  }
+void check_hub_inertia(const equations::Model& model, int p) {
+  equations::Scratch<double, Quad> scratch(model);
+  const std::vector<double> rest(static_cast<size_t>(3 + p), 0.0);
+  const std::vector<char> open(rest.size(), 0);
+  const equations::HubSystem<double> hub =
+      equations::condensed_hub(model, rest.data(), rest.data(), open, scratch, nullptr);
   const Eigen::Matrix3d mass = spatial::eigen(hub.tt), J = spatial::eigen(hub.ww);
   Eigen::Matrix3d coupling;
   for (size_t r = 0; r < 3; ++r) coupling.row(static_cast<Eigen::Index>(r)) = spatial::eigen(hub.tw.row[r]).transpose();

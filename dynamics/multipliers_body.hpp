@@ -46,15 +46,15 @@ void deform(const BodyData& b, const T* q, DeformedBody<T>& d) {
     d.Ct[k] = {T(b.Ct[k].x), T(b.Ct[k].y), T(b.Ct[k].z)};
     d.Cr[k] = {T(b.Cr0[k].x), T(b.Cr0[k].y), T(b.Cr0[k].z)};
   }
-  for (const Entry& e : b.Cr1) component_of(d.Cr[e.l], e.component) += e.value * q[e.k];
+  for (const Entry& e : b.Cr1) component(d.Cr[e.l], e.component) += e.value * q[e.k];
   for (const Entry& e : b.J1) d.J[e.component] += e.value * q[e.k];
   for (const Entry& e : b.J2) d.J[e.component] += e.value * (q[e.k] * q[e.l]);
   for (const Entry& e : b.Ct_slope) {
     const T v = e.value * q[e.l];
-    component_of(d.Ct[e.k], e.component) += v;
-    component_of(d.mc, e.component) += 0.5 * (v * q[e.k]);
+    component(d.Ct[e.k], e.component) += v;
+    component(d.mc, e.component) += 0.5 * (v * q[e.k]);
   }
-  for (const Entry& e : b.Cr_slope) component_of(d.Cr[e.k], e.component) += e.value * q[e.l];
+  for (const Entry& e : b.Cr_slope) component(d.Cr[e.k], e.component) += e.value * q[e.l];
 }
 
 /// Motion of a body; q and q_dot may carry derivatives, accelerations never do. acceleration: of R less gravity,
@@ -88,9 +88,9 @@ void body_forces(const BodyData& b, const BodyInput<T>& x, DeformedBody<T>& d, V
     on_q[e.k] -= vq * ww[e.component];
   }
   Vec3<T> twice = 2.0 * w;
-  for (const Entry& e : b.Cr1) on_q[e.k] -= e.value * (component_of(twice, e.component) * x.q_dot[e.l]);
-  for (const Entry& e : b.Ct_slope) component_of(t2, e.component) += e.value * (x.q_dot[e.k] * x.q_dot[e.l]);
-  for (const Entry& e : b.Cr_slope) component_of(w2, e.component) += e.value * (x.q_dot[e.k] * x.q_dot[e.l]);
+  for (const Entry& e : b.Cr1) on_q[e.k] -= e.value * (component(twice, e.component) * x.q_dot[e.l]);
+  for (const Entry& e : b.Ct_slope) component(t2, e.component) += e.value * (x.q_dot[e.k] * x.q_dot[e.l]);
+  for (const Entry& e : b.Cr_slope) component(w2, e.component) += e.value * (x.q_dot[e.k] * x.q_dot[e.l]);
   for (size_t k = 0; k < b.n; ++k) {
     P += x.q_dot[k] * d.Ct[k];
     Cr_rate += x.q_dot[k] * d.Cr[k];

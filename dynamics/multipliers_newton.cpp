@@ -53,7 +53,6 @@ namespace {
 
 Vec3<Lanes> lanes(const Vec3<double>& a) { return lifted<Lanes>(a); }
 Mat3<Lanes> lanes(const Mat3<double>& a) { return {{lanes(a.row[0]), lanes(a.row[1]), lanes(a.row[2])}}; }
-Lanes& component(Vec3<Lanes>& a, int i) { return i == 0 ? a.x : i == 1 ? a.y : a.z; }
 
 /// Derivative of A for a small rotation v in its own axes: A tilde(v).
 void turn(Mat3<Lanes>& A, const Vec3<double>& v, int lane) {

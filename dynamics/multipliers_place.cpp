@@ -24,8 +24,8 @@ Elastic<double> elastic_at(const PlaceData& p, const double* q, const double* q_
   }
   const auto add = [&](const std::vector<Entry>& slope, Vec3<double>& x, Vec3<double>& x_dot) {
     for (const Entry& s : slope) {
-      component_of(x, s.component) += 0.5 * s.value * (q[s.k] * q[s.l]);
-      component_of(x_dot, s.component) += s.value * (q[s.l] * q_dot[s.k]);
+      component(x, s.component) += 0.5 * s.value * (q[s.k] * q[s.l]);
+      component(x_dot, s.component) += s.value * (q[s.l] * q_dot[s.k]);
     }
   };
   add(p.S_slope, e.s, e.s_dot);
@@ -35,8 +35,8 @@ Elastic<double> elastic_at(const PlaceData& p, const double* q, const double* q_
 
 Elastic<double> elastic_bias(const PlaceData& p, const double* q_dot) {
   Elastic<double> e;
-  for (const Entry& s : p.S_slope) component_of(e.s_dot, s.component) += s.value * (q_dot[s.k] * q_dot[s.l]);
-  for (const Entry& s : p.theta_slope) component_of(e.phi_dot, s.component) += s.value * (q_dot[s.k] * q_dot[s.l]);
+  for (const Entry& s : p.S_slope) component(e.s_dot, s.component) += s.value * (q_dot[s.k] * q_dot[s.l]);
+  for (const Entry& s : p.theta_slope) component(e.phi_dot, s.component) += s.value * (q_dot[s.k] * q_dot[s.l]);
   return e;
 }
 

@@ -20,11 +20,6 @@ using Lanes = Dual<8>;
 inline double value(double a) { return a; }
 inline double value(const Lanes& a) { return a.v; }
 
-template <class T>
-T& component_of(Vec3<T>& v, size_t i) {
-  return i == 0 ? v.x : i == 1 ? v.y : v.z;
-}
-
 template <class S, class T>
 auto product(const Mat3<S>& a, const Mat3<T>& b) {
   using R = decltype(a.row[0].x * b.row[0].x);

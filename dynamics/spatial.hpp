@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <concepts>
 
 namespace flexboom::spatial {
 
@@ -91,6 +92,18 @@ auto transposed_product(const Mat3<S>& a, const Vec3<T>& b) {
   return Vec3<decltype(a.row[0].x * b.x)>{a.row[0].x * b.x + a.row[1].x * b.y + a.row[2].x * b.z,
                                           a.row[0].y * b.x + a.row[1].y * b.y + a.row[2].y * b.z,
                                           a.row[0].z * b.x + a.row[1].z * b.y + a.row[2].z * b.z};
+}
+
+/// Component of a vector, or of a symmetric matrix in the order of its members, by number.
+template <class T, std::integral I>
+T& component(Vec3<T>& a, I i) {
+  T* const entries[] = {&a.x, &a.y, &a.z};
+  return *entries[i];
+}
+template <class T, std::integral I>
+T& component(Sym3<T>& a, I i) {
+  T* const entries[] = {&a.xx, &a.yy, &a.zz, &a.xy, &a.yz, &a.zx};
+  return *entries[i];
 }
 
 inline Vec3<double> vec3(const Eigen::Vector3d& a) { return {a.x(), a.y(), a.z()}; }

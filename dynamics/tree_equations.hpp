@@ -169,7 +169,7 @@ template <class T>
 T mechanism_load(const Link& link, const T* y, const Instant::Drive& drive, bool contact) {
   if (link.kind != JointKind::hinge && link.kind != JointKind::slider) return T(0.0);
   const JointCoordinates<T> j(link, y, drive);
-  return equations::hinge_torque(link.body, j.x[0], j.rate[0], contact);
+  return equations::hinge_torque(link.body, j.x[0], j.rate[0], contact ? 1.0 : 0.0);
 }
 
 /// Eliminates freedom i of the joint, which has this force along it.

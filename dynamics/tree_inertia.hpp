@@ -70,13 +70,13 @@ void add_body(const Link& link, const T* y, LinkScratch<T>& s) {
     for (size_t k = 0; k < n; ++k) s.Ct[k] = equations::lift<T>(b.Ct[k]);
     for (const Term& t : link.Ct_slope) {
       const T v = t.value * q[t.l];
-      equations::component(s.Ct[static_cast<size_t>(t.k)], t.component) += v;
-      equations::component(inertia.mc, t.component) += 0.5 * (v * q[t.k]);
-      equations::component(t2, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
+      component(s.Ct[static_cast<size_t>(t.k)], t.component) += v;
+      component(inertia.mc, t.component) += 0.5 * (v * q[t.k]);
+      component(t2, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
     }
     for (const Term& t : link.Cr_slope) {
-      equations::component(s.modes.Cr[static_cast<size_t>(t.k)], t.component) += t.value * q[t.l];
-      equations::component(w2, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
+      component(s.modes.Cr[static_cast<size_t>(t.k)], t.component) += t.value * q[t.l];
+      component(w2, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
     }
     for (size_t k = 0; k < n; ++k) {
       s.Gt[k] = Vec3<T>{};

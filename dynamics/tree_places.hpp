@@ -103,15 +103,15 @@ void move_place(const PlaceModel& m, const T* q, const T* q_dot, PlaceMotion<T>&
   }
   for (const Term& t : m.S_slope) {
     const T v = t.value * q[t.l];
-    equations::component(U[t.k].t, t.component) += v;
-    equations::component(s.r, t.component) += 0.5 * (v * q[t.k]);
-    equations::component(s.r_ddot, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
+    component(U[t.k].t, t.component) += v;
+    component(s.r, t.component) += 0.5 * (v * q[t.k]);
+    component(s.r_ddot, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
   }
   for (const Term& t : m.theta_slope) {
     const T v = t.value * q[t.l];
-    equations::component(U[t.k].w, t.component) += v;
-    equations::component(theta, t.component) += 0.5 * (v * q[t.k]);
-    equations::component(bias, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
+    component(U[t.k].w, t.component) += v;
+    component(theta, t.component) += 0.5 * (v * q[t.k]);
+    component(bias, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
   }
   for (size_t k = 0; k < n; ++k) s.r_dot += q_dot[k] * U[k].t, rate += q_dot[k] * U[k].w;
   // Rotation exp(tilde(theta)); its angular velocity J theta_dot, J = 1 + f2 tilde(theta) + f3 tilde(theta)^2.

@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/LU>
 
+#include <array>
+
 namespace flexboom {
 namespace {
 
@@ -16,32 +18,36 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using testing::PointBody;
 
-/// Two appendages with every invariant non-zero on a hub, a random state, and the point masses as the oracle.
+/// Appendages with every invariant non-zero on a hub, a random state, and the point masses as the oracle. By the
+/// numbers of their modes four are computed side by side, two, and two alone.
 struct Case {
+  static constexpr std::array modes = {3, 2, 2, 4, 2, 3, 2, 2};
+
   std::mt19937 random{42};
   std::vector<PointBody> points;
   Matrix3d J_hub = Vector3d(1.3, 0.9, 0.7).asDiagonal();
   std::unique_ptr<System> system;
   VectorXd y;
-  std::vector<char> contact = {1, 0};
+  std::vector<char> contact = {1, 0, 1, 1, 0, 0, 0, 1};
 
   explicit Case(bool fixed_hub = false, const std::optional<OrbitalField>& field = {}) {
     J_hub(0, 1) = J_hub(1, 0) = 0.05;
     std::vector<Appendage> appendages;
-    for (int i = 0; i < 2; ++i) {
-      points.push_back(testing::random_point_body(random, 7, 3 - i, "body" + std::to_string(i)));
+    for (size_t i = 0; i < modes.size(); ++i) {
+      const auto k = static_cast<double>(i);
+      points.push_back(testing::random_point_body(random, 7, modes[i], "body" + std::to_string(i)));
       Hinge hinge;
-      hinge.point = Vector3d(0.1, -0.2 * i, 0.3);
+      hinge.point = Vector3d(0.1, -0.2 * k, 0.3);
       hinge.stowed = Vector3d(0, 0.6, 0.8);
-      hinge.outward = i == 0 ? Vector3d(1, 0, 0) : Vector3d(0, -0.8, 0.6);
-      hinge.mechanism = {0.3, 1.2, 0.02, 9.0, 1.4};
+      hinge.outward = i % 2 == 0 ? Vector3d(1, 0, 0) : Vector3d(0, -0.8, 0.6);
+      hinge.mechanism = {0.3 + 0.1 * k, 1.2, 0.02 + 0.01 * k, 9.0 + k, 1.4};
       appendages.push_back({points.back().body, hinge});
     }
     system = std::make_unique<System>(rigid_body("hub", 2.5, Vector3d::Zero(), J_hub), appendages, fixed_hub, field);
     std::uniform_real_distribution<double> uniform(-1, 1);
-    State s = system->at_rest({1.6, 0.9});
+    State s = system->at_rest({1.6, 0.9, 1.5, 1.8, 0.7, 1.1, 1.3, 1.7});
     const auto noise = [&] { return uniform(random); };
-    for (size_t i = 0; i < 2; ++i) {
+    for (size_t i = 0; i < modes.size(); ++i) {
       s.rate[i] = noise();
       s.q[i] = 0.2 * VectorXd::NullaryExpr(s.q[i].size(), noise);
       s.q_dot[i] = VectorXd::NullaryExpr(s.q[i].size(), noise);
@@ -86,7 +92,7 @@ VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub, double& power) {
     const Appendage& a = c.system->appendages()[i];
     const Matrix3d C = c.system->boom_to_hub(static_cast<int>(i), s.angle[i]);
     const Vector3d z = Vector3d::UnitZ();
-    const int at = 6 + l.body[i], modes = p.body.n();
+    const int at = 6 + l.body[i], n_modes = p.body.n();
     for (size_t k = 0; k < p.dm.size(); ++k) {
       const Vector3d x = p.u0[k] + p.S[k] * s.q[i], x_dot = p.S[k] * s.q_dot[i];
       const Vector3d r = a.hinge.point + C * x, r_dot = C * (s.rate[i] * z.cross(x) + x_dot);
@@ -94,7 +100,7 @@ VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub, double& power) {
       B.leftCols<3>().setIdentity();
       B.middleCols<3>(3) = -tilde(r);
       B.col(at) = C * z.cross(x);
-      B.middleCols(at + 1, modes) = C * p.S[k];
+      B.middleCols(at + 1, n_modes) = C * p.S[k];
       const Vector3d bias = s.omega.cross(s.omega.cross(r)) + 2 * s.omega.cross(r_dot) +
                             C * (s.rate[i] * s.rate[i] * z.cross(z.cross(x)) + 2 * s.rate[i] * z.cross(x_dot));
       M += p.dm[k] * B.transpose() * B;
@@ -105,7 +111,7 @@ VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub, double& power) {
     const HingeMechanism& h = a.hinge.mechanism;
     f[at] += h.stiffness * (h.rest - s.angle[i]) - h.damping * s.rate[i];
     if (c.contact[i]) f[at] -= h.stop_stiffness * (s.angle[i] - h.threshold);
-    f.segment(at + 1, modes) -= p.body.Ke * s.q[i] + p.body.De * s.q_dot[i];
+    f.segment(at + 1, n_modes) -= p.body.Ke * s.q[i] + p.body.De * s.q_dot[i];
   }
   const VectorXd acceleration = M.lu().solve(f);
   a_hub = acceleration.head<3>();
