@@ -2,6 +2,7 @@
 
 #include "dynamics/linear_part.hpp"
 #include "dynamics/rotation.hpp"
+#include "dynamics/small_product.hpp"
 #include "dynamics/stop_search.hpp"
 #include "dynamics/workspace.hpp"
 #include "fem/check.hpp"
@@ -177,7 +178,7 @@ class ExponentialStepper final : public Stepper {
     step_.M.resize(m, points);
     N_.resize(m, points);
     integral_.resize(m);
-    step_.Z.col(0).noalias() = step_.linear->to_modes * y.head(nx_);
+    small_product(step_.linear->to_modes, y.head(nx_), step_.Z.leftCols(1));
     step_.X.col(0) = y.head(nx_);
     evaluate(0);
     step_.linear->remainder(F_.leftCols(1), step_.Z.leftCols(1), N_.leftCols(1));
@@ -248,7 +249,9 @@ class ExponentialStepper final : public Stepper {
     z_error_.resize(m);
     M_error_.noalias() = step_.length * error_modes_ * middle_.transpose();
     step_.linear->combine(step_.grid->at[degree], 0, zero_, M_error_, z_error_);
-    double error = norm(step_.linear->from_modes * z_error_);
+    x_error_.resize(nx_);
+    small_product(step_.linear->from_modes, z_error_, x_error_);
+    double error = norm(x_error_);
     const double weight = step_.length * collocation::middle_polynomial().dot(collocation::integrals(1));
     const double lost = std::abs(power_.dot(d)) * weight;
     if (!system_.fixed_hub()) {
@@ -283,7 +286,8 @@ class ExponentialStepper final : public Stepper {
     last_used_ = step_.length;
     if (last) return;
     const double growth = std::pow(std::max(error, 1e-10), -1.0 / (degree + 1));
-    if (growth > 1.25 * rung) h_ = on_ladder(step_.length * (growth > 4 ? rung * rung : rung));
+    // Up to four times: after a stop the first steps follow what decays at once.
+    if (growth > 1.25 * rung) h_ = on_ladder(step_.length * (growth > 4 ? std::min(4.0, growth / 2) : rung));
     if (first_) step_.linear->step = step_.length;
   }
   double smaller(double error) const {
@@ -367,7 +371,7 @@ class ExponentialStepper final : public Stepper {
   VectorXd start_, reached_state_;
   VectorXd y_, y_dot_, previous_;
   MatrixXd F_, N_, last_N_, M_error_;
-  VectorXd error_modes_, z_error_, zero_, integral_;
+  VectorXd error_modes_, z_error_, x_error_, zero_, integral_;
   Points power_ = Points::Zero(), power_coefficients_ = Points::Zero();
   Points middle_ = Points::Zero();
   collocation::Table scaled_coefficients_;

@@ -1,6 +1,7 @@
 #include "dynamics/linear_part.hpp"
 
 #include "dynamics/phi.hpp"
+#include "dynamics/small_product.hpp"
 #include "fem/check.hpp"
 #include "fem/dense.hpp"
 #include "fem/lanes.hpp"
@@ -43,31 +44,6 @@ VectorXd balance(MatrixXd& L) {
   return D;
 }
 
-/// C += A B for `columns` columns of B; A is rows x inner.
-template <int columns>
-[[gnu::always_inline]] inline void add_columns(const double* A, Index rows, Index stride_A, Index inner,
-                                               const double* B, Index stride_B, double* C, Index stride_C) {
-  for (Index k = 0; k < inner; ++k, A += stride_A) {
-    for (int c = 0; c < columns; ++c) {
-      const double b = B[k + c * stride_B];
-      double* const target = C + c * stride_C;
-#pragma GCC ivdep
-      for (Index i = 0; i < rows; ++i) target[i] += b * A[i];
-    }
-  }
-}
-
-FLEXBOOM_FOR_EACH_PROCESSOR
-void product_of_columns(const double* A, Index rows, Index stride_A, Index inner, const double* B, Index stride_B,
-                        Index columns, double* C, Index stride_C) {
-  for (Index c = 0; c < columns; ++c) std::fill_n(C + c * stride_C, rows, 0.0);
-  Index c = 0;
-  for (; c + 4 <= columns; c += 4)
-    add_columns<4>(A, rows, stride_A, inner, B + c * stride_B, stride_B, C + c * stride_C, stride_C);
-  for (; c < columns; ++c)
-    add_columns<1>(A, rows, stride_A, inner, B + c * stride_B, stride_B, C + c * stride_C, stride_C);
-}
-
 /// (zr, zi) = sum over k of b_k times v_k, complex, in halves of m; v_k are the columns z0, M.
 FLEXBOOM_FOR_EACH_PROCESSOR
 void sum_of_products(Index m, Index terms, const double* b, const double* z0, const double* M, double* z) {
@@ -95,11 +71,6 @@ void sum_of_products(Index m, Index terms, const double* b, const double* z0, co
 }
 
 }  // namespace
-
-void small_product(const Eigen::Ref<const MatrixXd>& A, const Eigen::Ref<const MatrixXd>& B, Eigen::Ref<MatrixXd> C) {
-  product_of_columns(A.data(), A.rows(), A.outerStride(), A.cols(), B.data(), B.outerStride(), B.cols(), C.data(),
-                     C.outerStride());
-}
 
 LinearPart::LinearPart(MatrixXd L, MatrixXd a_hub_by_x, int first_omega, VectorXd base_p)
     : a_hub(std::move(a_hub_by_x)), base(std::move(base_p)) {

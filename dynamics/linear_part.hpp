@@ -60,8 +60,4 @@ struct LinearPart {
   std::map<double, Grid> grids_;
 };
 
-/// C = A B, all by columns: for a few columns of B and sizes below a hundred, where a library's packing costs more.
-void small_product(const Eigen::Ref<const Eigen::MatrixXd>& A, const Eigen::Ref<const Eigen::MatrixXd>& B,
-                   Eigen::Ref<Eigen::MatrixXd> C);
-
 }  // namespace flexboom
