@@ -153,7 +153,7 @@ Assembly assemble(const Mesh& mesh, int threads) {
   bool has_beams = false;
   for (const Element& element : mesh.elements) has_beams = has_beams || type_of(element).shape == Shape::line;
   for (const std::vector<int>& group : independent_groups(mesh, dofs)) {
-    parallel_for(threads, static_cast<int>(group.size()), 16, [&](int i) {
+    parallel_for(threads, static_cast<int>(group.size()), 8, [&](int i) {
       const int e = group[static_cast<size_t>(i)];
       const Element& element = element_of(mesh, e);
       const ElementType& type = type_of(element);

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 
 namespace flexboom {
@@ -189,10 +190,18 @@ void PatternMatrix::add(const std::vector<int>& entities, int node_freedoms, con
 
 std::vector<std::vector<int>> independent_groups(const Mesh& mesh, const DofMap& dofs) {
   constexpr int max_groups = 64;
+  constexpr int slab = 1024;  // elements whose part of the matrices stays in a cache
   std::vector<std::uint64_t> taken(at(static_cast<int>(mesh.nodes.cols() + std::ssize(mesh.elements))), 0);
   std::vector<std::vector<int>> groups;
-  std::vector<std::vector<int>> alone;  // elements that found no group
+  std::vector<std::vector<int>> of_slab(max_groups), alone;  // alone: elements that found no group
+  const auto close_slab = [&] {
+    for (std::vector<int>& group : of_slab)
+      if (!group.empty()) groups.push_back(std::move(group)), group.clear();
+    std::ranges::move(alone, std::back_inserter(groups));
+    alone.clear();
+  };
   for (int e = 0; e < std::ssize(mesh.elements); ++e) {
+    if (e % slab == 0) close_slab();
     const std::vector<int> entities = entities_of(mesh, dofs, e);
     std::uint64_t used = 0;
     for (const int a : entities) used |= taken[at(a)];
@@ -201,11 +210,10 @@ std::vector<std::vector<int>> independent_groups(const Mesh& mesh, const DofMap&
       alone.push_back({e});
       continue;
     }
-    if (group == std::ssize(groups)) groups.emplace_back();
-    groups[at(group)].push_back(e);
+    of_slab[at(group)].push_back(e);
     for (const int a : entities) taken[at(a)] |= std::uint64_t{1} << group;
   }
-  groups.insert(groups.end(), alone.begin(), alone.end());
+  close_slab();
   return groups;
 }
 
