@@ -9,7 +9,6 @@
 
 namespace flexboom {
 
-using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
