@@ -9,7 +9,6 @@ namespace {
 
 using equations::Body;
 using equations::TermOf;
-using spatial::Mat3;
 using spatial::Sym3;
 using spatial::Vec3;
 using Members = std::array<const Body*, Quad::width>;

@@ -120,10 +120,9 @@ void System::jacobian(const double* y, std::span<const char> contact, Workspace&
   w.dudot.setZero();
   w.hub_columns.setZero();
   const auto own = w.dudot.bottomRows(l.p);
-  for (size_t i = 0; i < model.singles.size(); ++i)
-    slopes(model.singles[i], y, u, l, contact, a, alpha, w.dual_scratch.singles[i], w.hub_columns, own);
-  for (size_t i = 0; i < model.quads.size(); ++i)
-    slopes(model.quads[i], y, u, l, contact, a, alpha, w.dual_scratch.quads[i], w.hub_columns, own);
+  equations::for_each_side_by_side(model, w.dual_scratch, [&](const auto& bodies, auto& s) {
+    slopes(bodies, y, u, l, contact, a, alpha, s, w.hub_columns, own);
+  });
   if (!l.base) return;
 
   using D = Workspace::D;
@@ -193,8 +192,7 @@ void System::solve_newton(const double* b, Workspace& w, double* x) const {
   // The followers, exactly: attitude, velocity, position, dissipated energy depend on p and u, not the other way round.
   const double* y = w.y.data();
   const double* u = y + l.u_begin();
-  double dissipated = b[l.dissipated()];
-  dissipated += gamma * power_slope(l, impl_->appendages, u, w.delta.data() + l.p);
+  const double dissipated = b[l.dissipated()] + gamma * power_slope(l, impl_->appendages, u, w.delta.data() + l.p);
   if (!impl_->fixed_hub) {
     const Vector3d domega = w.delta.segment<3>(l.p);
     double rate[4];
