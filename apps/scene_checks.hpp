@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <string>
 #include <string_view>
+#include <vector>
 
 /// Checks of single values under their key paths. Written so that NaN fails where a value stands alone. Internal to
 /// `apps`.
@@ -28,6 +29,14 @@ void check_name(toml_reader::Faults&, const std::string& path, const std::string
 
 /// Symmetric, positive definite (or, where a point mass is allowed, not negative), triangle inequality.
 void check_inertia(toml_reader::Faults&, const std::string& path, const Eigen::Matrix3d&, bool may_vanish);
+
+/// Of the rows of a table.
+template <class Table>
+std::vector<std::string_view> names_of(const Table& table) {
+  std::vector<std::string_view> names;
+  for (const auto& row : table) names.push_back(row.name);
+  return names;
+}
 
 template <class Names>
 void check_name_among(toml_reader::Faults& faults, const std::string& path, const std::string& value,

@@ -1,0 +1,274 @@
+#include "apps/scene.hpp"
+#include "apps/scene_checks.hpp"
+#include "apps/scene_keys.hpp"
+#include "fem/check.hpp"
+#include "fem/constraints.hpp"
+#include "reduction/eigen_solver.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+// Comparisons are written so that NaN fails them where a value stands alone, and passes where two values are compared:
+// then the fault is reported at the value that is NaN, once.
+
+namespace flexboom {
+
+using scene_keys::Dimension;
+using toml_reader::Faults;
+
+namespace {
+
+using namespace scene_checks;
+
+constexpr int max_modes = 10000;      // per body; more is a typing error
+constexpr int max_elements = 100000;  // per segment; as make_mesh
+
+std::vector<std::string_view> backend_names() {
+  std::vector<std::string_view> names = names_of(eigen_backends());
+  names.push_back("auto");
+  return names;
+}
+
+void check_shape(Faults& faults, const std::string& path, SectionShape shape) {
+  for (const Dimension& d : scene_keys::dimensions(shape)) check_positive(faults, join(path, d.key), *d.value, "");
+  if (const auto* tube = std::get_if<Tube>(&shape); tube && 2 * tube->thickness >= tube->diameter) {
+    faults.add(join(path, "thickness"),
+               fmt::format("is {} m, half of the diameter {} m or more; a tube needs less, a full bar is "
+                           "shape \"round-bar\"",
+                           tube->thickness, tube->diameter));
+  }
+  const auto* box = std::get_if<RectangularTube>(&shape);
+  if (box && (2 * box->thickness >= box->height || 2 * box->thickness >= box->width)) {
+    faults.add(join(path, "thickness"),
+               fmt::format("is {} m, half of a side ({} m x {} m) or more; a tube needs less, a full bar "
+                           "is shape \"rectangle\"",
+                           box->thickness, box->height, box->width));
+  }
+}
+
+bool is_tapered(const BeamSegment& segment) {
+  SectionShape start = segment.start, end = segment.end;
+  const auto a = scene_keys::dimensions(start), b = scene_keys::dimensions(end);
+  return !std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Dimension& x, const Dimension& y) {
+    return x.key == y.key && (*x.value == *y.value || (std::isnan(*x.value) && std::isnan(*y.value)));
+  });
+}
+
+void check_material(Faults& faults, const std::string& path, const Material& material) {
+  check_positive(faults, join(path, "E"), material.E, " Pa");
+  if (!(material.nu > -1 && material.nu < 0.5)) {
+    faults.add(join(path, "nu"),
+               fmt::format("is {}; Poisson's ratio must lie between -1 and 0.5, both excluded", material.nu));
+  }
+  check_not_negative(faults, join(path, "rho"), material.rho, " kg/m^3");
+}
+
+void check_segment(Faults& faults, const std::string& path, const BeamSegment& segment) {
+  check_positive(faults, join(path, "length"), segment.length, " m");
+  if (segment.elements < 0 || segment.elements > max_elements) {
+    faults.add(join(path, "elements"), fmt::format("is {}; it must be 1 to {}, or 0 to let the program choose",
+                                                   segment.elements, max_elements));
+  }
+  check_material(faults, join(path, "material"), segment.material);
+  check_shape(faults, path, segment.start);
+  if (is_tapered(segment)) check_shape(faults, join(path, "end"), segment.end);
+}
+
+void check_attachment(Faults& faults, const std::string& path, const RigidAttachment& attachment, double boom_length) {
+  if (!attachment.name.empty()) check_name(faults, join(path, "name"), attachment.name);
+  if (attachment.position < 0 || attachment.position > boom_length * (1 + round_off)) {
+    faults.add(join(path, "position"),
+               fmt::format("is {} m, which is not on the boom; it must be 0 to {} m, or \"tip\"", attachment.position,
+                           boom_length));
+  }
+  check_finite(faults, join(path, "position"), attachment.position);
+  check_not_negative(faults, join(path, "mass"), attachment.mass, " kg");
+  check_finite(faults, join(path, "offset"), attachment.offset);
+  check_inertia(faults, join(path, "inertia"), attachment.inertia, true);
+  if (attachment.mass == 0 && !attachment.inertia.isZero(0)) {
+    faults.add(join(path, "inertia"), "has no mass to carry it; give mass");
+  }
+  if (attachment.mass == 0 && !attachment.offset.isZero(0)) {
+    faults.add(join(path, "offset"), "has no mass to move; give mass");
+  }
+}
+
+void check_shear_name(Faults& faults, const std::string& path, const std::string& name) {
+  const auto& rules = scene_keys::shear_rules;
+  if (std::find(rules.begin(), rules.end(), name) != rules.end()) return;
+  faults.add(path, toml_reader::not_among(name, rules) + ", or the shear coefficient itself, a number");
+}
+
+void check_geometry(Faults& faults, const std::string& path, const BeamGeometry& boom) {
+  if (boom.segments.empty())
+    faults.add(join(path, "segments"), "a boom needs at least one; give [[segments]] or a body file");
+  if (boom.order < 1 || boom.order > 12)
+    faults.add(join(path, "order"), fmt::format("is {}; it must be 1 to 12", boom.order));
+  if (boom.shear.name == "value") {
+    check_positive(faults, join(path, "shear"), boom.shear.value, "");
+  } else {
+    check_shear_name(faults, join(path, "shear"), boom.shear.name);
+  }
+  for (size_t i = 0; i < boom.segments.size(); ++i) {
+    check_segment(faults, join(path, fmt::format("segments[{}]", i)), boom.segments[i]);
+  }
+  const double length = faults.clean(join(path, "segments")) ? boom.length() : std::numeric_limits<double>::quiet_NaN();
+  std::set<std::string> names = {"root", "tip"};
+  for (size_t i = 0; i < boom.attachments.size(); ++i) {
+    const RigidAttachment& attachment = boom.attachments[i];
+    const std::string at = join(path, fmt::format("attachments[{}]", i));
+    check_attachment(faults, at, attachment, length);
+    if (!attachment.name.empty() && !names.insert(attachment.name).second) {
+      faults.add(join(at, "name"), fmt::format("\"{}\" is taken; choose another", attachment.name));
+    }
+  }
+}
+
+void check_damping(Faults& faults, const std::string& path, const DampingRule& damping) {
+  check_name_among(faults, join(path, "rule"), damping.name, scene_keys::damping_rules);
+  check_not_negative(faults, join(path, "value"), damping.value, "");
+  check_not_negative(faults, join(path, "alpha"), damping.alpha, " 1/s");
+  check_not_negative(faults, join(path, "beta"), damping.beta, " s");
+  const bool by_value = damping.name == "modal" || damping.name == "loss-factor";
+  const bool rayleigh = damping.name == "rayleigh";
+  const auto refuse = [&](std::string_view key, double value, bool used) {
+    if (value == 0 || used) return;
+    faults.add(join(path, key),
+               fmt::format("is {} but is not used by rule \"{}\"; value belongs to \"modal\" and \"loss-factor\", "
+                           "alpha and beta to \"rayleigh\"",
+                           value, damping.name));
+  };
+  if (!faults.clean(join(path, "rule"))) return;
+  refuse("value", damping.value, by_value);
+  refuse("alpha", damping.alpha, rayleigh);
+  refuse("beta", damping.beta, rayleigh);
+}
+
+// The closed form knows one uniform line mass, clamped at its root.
+void check_eq14(Faults& faults, const std::string& path, const BodyScene& body) {
+  const BeamGeometry& boom = body.geometry;
+  std::string fault;
+  if (boom.segments.size() > 1) fault = fmt::format("this one has {} segments", boom.segments.size());
+  if (!boom.attachments.empty()) fault = fmt::format("this one has {} attachment(s)", boom.attachments.size());
+  if (boom.segments.size() == 1 && is_tapered(boom.segments[0])) fault = "this one is tapered";
+  if (boom.segments.size() == 1 && boom.segments[0].material.rho == 0) fault = "this one has rho = 0";
+  if (body.clamp != "root") fault = fmt::format("this one is clamped at {}", toml_reader::quoted(body.clamp));
+  if (!fault.empty()) {
+    faults.add(
+        join(path, "structure"),
+        fmt::format(
+            "is \"eq14\", the closed form of one uniform segment with mass, clamped at \"root\"; {}; use \"beam\"",
+            fault));
+  }
+  if (body.directions == "all" && !body.modes_auto && body.modes % 2 != 0)
+    faults.add(join(path, "modes"),
+               fmt::format("is {}; eq. 14 has equal modes in two planes, so with directions = \"all\" "
+                           "it must be even",
+                           body.modes));
+}
+
+/// Freedoms a clamped mesh has left: in all, and for bending along y. An element of order p has p internal freedoms of
+/// extension and of torsion, and the rest in halves for the two bending planes.
+struct Unknowns {
+  int all = 0;
+  int hinge_plane = 0;
+};
+
+Unknowns count_unknowns(const Mesh& mesh, const std::vector<int>& clamp) {
+  Unknowns unknowns;
+  unknowns.all = flexboom::unknowns(mesh, assemble(mesh).dofs, clamp).count;
+  unknowns.hinge_plane = 2 * static_cast<int>(mesh.nodes.cols() - std::ssize(clamp));
+  for (const Element& element : mesh.elements) {
+    const int internal = element_types()[static_cast<size_t>(element.type)].internal_freedoms(mesh, element);
+    unknowns.hinge_plane += (internal - 2 * element.order) / 2;
+  }
+  return unknowns;
+}
+
+void check_mode_count(Faults& faults, const std::string& path, const BodyScene& body) {
+  const Mesh mesh = make_mesh(body.geometry);
+  if (body.modes <= std::ssize(mesh.elements)) return;  // every element brings more than one; spares the assembly
+  const Unknowns unknowns = count_unknowns(mesh, node_set(mesh, body.clamp));
+  const bool all = body.directions == "all";
+  const int limit = all ? unknowns.all : unknowns.hinge_plane;
+  if (body.modes <= limit) return;
+  faults.add(
+      join(path, "modes"),
+      fmt::format("is {}, but the mesh has only {} unknowns{}; ask for fewer modes, or give the segments more elements",
+                  body.modes, limit, all ? "" : " for bending in the hinge plane"));
+}
+
+// What needs the body as a whole. The mesh's own checks are the net under the ones above.
+void check_model(Faults& faults, const std::string& path, const BodyScene& body) {
+  try {
+    body.geometry.validate();
+    for (const BeamSegment& segment : body.geometry.segments) {
+      const bool sheared = body.geometry.theory == BeamTheory::timoshenko;
+      const ShearRule rule = sheared ? body.geometry.shear : ShearRule{"value", 1};
+      section_of(segment.start, segment.material.nu, rule);
+      section_of(segment.end, segment.material.nu, rule);
+    }
+    if (body.structure == "beam" && !body.modes_auto) check_mode_count(faults, path, body);
+    if (body.structure == "solid") chosen(body.geometry, body.solid);
+  } catch (const InputError& error) {
+    faults.add(join(path, "segments"), error.what());
+  }
+}
+
+void check_clamp(Faults& faults, const std::string& path, const BodyScene& body) {
+  std::vector<std::string_view> sets = {"root", "tip"};
+  for (const RigidAttachment& attachment : body.geometry.attachments) {
+    if (!attachment.name.empty()) sets.push_back(attachment.name);
+  }
+  check_name_among(faults, join(path, "clamp"), body.clamp, sets);
+}
+
+void check_rigid(Faults& faults, const std::string& path, const RigidScene& body) {
+  check_positive(faults, join(path, "mass"), body.mass, " kg");
+  check_inertia(faults, join(path, "inertia"), body.inertia, true);
+  check_finite(faults, join(path, "centre"), body.centre);
+  for (int i = 0; i < 3; ++i) check_not_negative(faults, join(path, "size"), body.size(i), " m");
+}
+
+void check_stiffening(Faults& faults, const std::string& path, const BodyScene& body) {
+  check_name_among(faults, join(path, "stiffening"), body.stiffening, scene_keys::stiffenings);
+  if (body.stiffening != "on") return;
+  const bool without = body.structure == "eq14" || (body.reduced && body.reduced->Kg.spin.empty());
+  if (without)
+    faults.add(join(path, "stiffening"), body.reduced
+                                             ? "is \"on\", but the file has no geometric stiffness; make it anew with "
+                                               "`flexboom reduce`, or say \"off\""
+                                             : "is \"on\", but structure \"eq14\" has none; use \"beam\", or \"off\"");
+}
+
+}  // namespace
+
+void check_body(const BodyScene& body, const std::string& path, Faults& faults) {
+  check_name(faults, join(path, "name"), body.name);
+  if (!body.stiffening.empty()) check_stiffening(faults, path, body);
+  if (body.rigid) return check_rigid(faults, path, *body.rigid);
+  if (body.reduced || !body.reduced_file.empty()) return check_damping(faults, join(path, "damping"), body.damping);
+  if (body.structure == "solid" && !path.empty()) {
+    faults.add(
+        join(path, "structure"),
+        "\"solid\" has modes and a mesh but does not fly in this version; in a scene it must be \"beam\", \"eq14\" or "
+        "\"rigid\"");
+  }
+  check_name_among(faults, join(path, "structure"), body.structure, scene_keys::structures);
+  check_name_among(faults, join(path, "directions"), body.directions, scene_keys::directions);
+  check_name_among(faults, join(path, "backend"), body.backend, backend_names());
+  check_clamp(faults, path, body);
+  if (body.modes < 0 || body.modes > max_modes) {
+    faults.add(join(path, "modes"), fmt::format("is {}; it must be 0 to {}, or \"auto\"", body.modes, max_modes));
+  }
+  check_damping(faults, join(path, "damping"), body.damping);
+  check_geometry(faults, path, body.geometry);
+  if (body.structure == "eq14") check_eq14(faults, path, body);
+  if (faults.clean(path)) check_model(faults, path, body);
+}
+
+}  // namespace flexboom

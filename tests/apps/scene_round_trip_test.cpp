@@ -1,0 +1,202 @@
+#include "apps/scene.hpp"
+
+#include "fem/check.hpp"
+#include "scene_testing.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <variant>
+
+namespace flexboom {
+namespace {
+
+using std::numbers::pi;
+
+bool same(const SectionShape& a, const SectionShape& b) {
+  if (a.index() != b.index()) return false;
+  const Section x = section_of(a, 0.3, {"cowper", 0}), y = section_of(b, 0.3, {"cowper", 0});
+  return x.A == y.A && x.Iy == y.Iy && x.Iz == y.Iz && x.J == y.J && x.kappa_y == y.kappa_y && x.kappa_z == y.kappa_z;
+}
+
+void expect_same(const BeamGeometry& a, const BeamGeometry& b) {
+  EXPECT_EQ(a.theory, b.theory);
+  EXPECT_EQ(a.shear.name, b.shear.name);
+  EXPECT_EQ(a.shear.value, b.shear.value);
+  EXPECT_EQ(a.rotary_inertia, b.rotary_inertia);
+  EXPECT_EQ(a.order, b.order);
+  ASSERT_EQ(a.segments.size(), b.segments.size());
+  for (size_t i = 0; i < a.segments.size(); ++i) {
+    const BeamSegment &x = a.segments[i], &y = b.segments[i];
+    EXPECT_TRUE(same(x.start, y.start) && same(x.end, y.end)) << "segment " << i;
+    EXPECT_EQ(x.length, y.length);
+    EXPECT_EQ(x.elements, y.elements);
+    EXPECT_EQ(x.material.E, y.material.E);
+    EXPECT_EQ(x.material.nu, y.material.nu);
+    EXPECT_EQ(x.material.rho, y.material.rho);
+  }
+  ASSERT_EQ(a.attachments.size(), b.attachments.size());
+  for (size_t i = 0; i < a.attachments.size(); ++i) {
+    const RigidAttachment &x = a.attachments[i], &y = b.attachments[i];
+    EXPECT_EQ(x.name, y.name);
+    EXPECT_EQ(x.position, y.position);
+    EXPECT_EQ(x.mass, y.mass);
+    EXPECT_EQ(x.inertia, y.inertia);
+    EXPECT_EQ(x.offset, y.offset);
+  }
+}
+
+void expect_same(const BodyScene& a, const BodyScene& b) {
+  EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.structure, b.structure);
+  EXPECT_EQ(a.clamp, b.clamp);
+  EXPECT_EQ(a.modes, b.modes);
+  EXPECT_EQ(a.modes_auto, b.modes_auto);
+  EXPECT_EQ(a.directions, b.directions);
+  EXPECT_EQ(a.damping.name, b.damping.name);
+  EXPECT_EQ(a.damping.value, b.damping.value);
+  EXPECT_EQ(a.damping.alpha, b.damping.alpha);
+  EXPECT_EQ(a.damping.beta, b.damping.beta);
+  EXPECT_EQ(a.backend, b.backend);
+  expect_same(a.geometry, b.geometry);
+}
+
+void expect_same(const HingeScene& a, const HingeScene& b) {
+  EXPECT_EQ(a.body, b.body);
+  EXPECT_EQ(a.hinge.name, b.hinge.name);
+  EXPECT_EQ(a.hinge.point, b.hinge.point);
+  EXPECT_EQ(a.hinge.stowed, b.hinge.stowed);
+  EXPECT_EQ(a.hinge.outward, b.hinge.outward);
+  const HingeMechanism &x = a.hinge.mechanism, &y = b.hinge.mechanism;
+  EXPECT_EQ(x.stiffness, y.stiffness);
+  EXPECT_EQ(x.rest, y.rest);
+  EXPECT_EQ(x.damping, y.damping);
+  EXPECT_EQ(x.stop_stiffness, y.stop_stiffness);
+  EXPECT_EQ(x.threshold, y.threshold);
+  EXPECT_EQ(a.start_angle, b.start_angle);
+  EXPECT_EQ(a.start_rate, b.start_rate);
+}
+
+void expect_same_settings(const Scene& a, const Scene& b) {
+  EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.duration, b.duration);
+  EXPECT_EQ(a.output_step, b.output_step);
+  EXPECT_EQ(a.vtu_step, b.vtu_step);
+  EXPECT_EQ(a.tolerance, b.tolerance);
+  EXPECT_EQ(a.outputs, b.outputs);
+  EXPECT_EQ(a.error_budget, b.error_budget);
+  EXPECT_EQ(a.integrator, b.integrator);
+  EXPECT_EQ(a.formulation, b.formulation);
+  EXPECT_EQ(a.settle, b.settle);
+  EXPECT_EQ(a.rescale_at_events, b.rescale_at_events);
+  EXPECT_EQ(a.hub.mass, b.hub.mass);
+  EXPECT_EQ(a.hub.inertia, b.hub.inertia);
+  EXPECT_EQ(a.hub.fixed, b.hub.fixed);
+  EXPECT_EQ(a.hub.size, b.hub.size);
+  EXPECT_EQ(a.start_rate, b.start_rate);
+  EXPECT_EQ(a.start_velocity, b.start_velocity);
+  ASSERT_EQ(a.orbit.has_value(), b.orbit.has_value());
+  if (!a.orbit) return;
+  EXPECT_EQ(a.orbit->altitude, b.orbit->altitude);
+  EXPECT_EQ(a.orbit->inclination, b.orbit->inclination);
+  EXPECT_EQ(a.orbit->gravity, b.orbit->gravity);
+  EXPECT_EQ(a.orbit->J2, b.orbit->J2);
+}
+
+// Warnings are about what was repaired; a scene that is written out has been repaired.
+void expect_round_trip(const Scene& scene) {
+  const std::string text = to_toml(scene);
+  const Scene again = parse_scene(text, "again.toml");
+  expect_same_settings(scene, again);
+  ASSERT_EQ(scene.bodies.size(), again.bodies.size());
+  for (size_t i = 0; i < scene.bodies.size(); ++i) expect_same(scene.bodies[i], again.bodies[i]);
+  ASSERT_EQ(scene.hinges.size(), again.hinges.size());
+  for (size_t i = 0; i < scene.hinges.size(); ++i) expect_same(scene.hinges[i], again.hinges[i]);
+  EXPECT_TRUE(again.warnings.empty());
+  EXPECT_EQ(text, to_toml(again));
+}
+
+TEST(Scene, EveryKeyIsRead) {
+  const Scene scene = parse_scene(full_scene, "full.toml");
+  const BodyScene& body = scene.bodies.at(0);
+  EXPECT_EQ(scene.integrator, "adams");
+  EXPECT_EQ(scene.settle, 1e-7);
+  EXPECT_FALSE(scene.error_budget);
+  EXPECT_TRUE(body.modes_auto);
+  EXPECT_EQ(body.geometry.shear.name, "value");
+  EXPECT_EQ(body.geometry.shear.value, 0.85);
+  EXPECT_EQ(body.geometry.theory, BeamTheory::euler_bernoulli);
+  const auto& end = std::get<GeneralSection>(body.geometry.segments.at(1).end);
+  EXPECT_EQ(end.A, 2e-5);
+  EXPECT_EQ(end.Iz, 2e-10);  // as the start
+  EXPECT_EQ(end.kappa_z, 0.7);
+  EXPECT_EQ(body.geometry.attachments.at(0).position, body.geometry.length());
+  EXPECT_EQ(scene.hinges.at(0).hinge.mechanism.stiffness, 0.3);
+}
+
+TEST(Scene, WrittenSceneReadsBackTheSame) {
+  expect_round_trip(load_scene("sport"));
+  expect_round_trip(parse_scene(full_scene, "full.toml"));
+}
+
+TEST(Scene, RandomNumbersSurviveTheRoundTripBitForBit) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> unit(0.1, 1);
+  for (int i = 0; i < 20; ++i) {
+    Scene scene = load_scene("sport");
+    scene.duration = std::pow(10, 4 * unit(random));
+    for (HingeScene& hinge : scene.hinges) {
+      hinge.hinge.stowed = Eigen::Vector3d::NullaryExpr([&] { return unit(random); }).normalized();
+      hinge.hinge.outward = hinge.hinge.stowed.unitOrthogonal();
+      hinge.hinge.mechanism.stiffness = unit(random) * 1e-7;
+      hinge.start_angle = unit(random) * 1e22;
+    }
+    expect_round_trip(scene);
+  }
+}
+
+TEST(Scene, HubAloneIsAScene) {
+  const Scene scene =
+      parse_scene("format = \"flexboom-scene-1\"\nname = \"hub\"\n[hub]\nmass = 1\ninertia = [1, 1, 1]\n", "hub.toml");
+  EXPECT_TRUE(scene.bodies.empty());
+  EXPECT_EQ(scene.duration, 10);
+  expect_round_trip(scene);
+}
+
+TEST(Scene, FixedHubNeedsNoMass) {
+  const Scene scene =
+      parse_scene("format = \"flexboom-scene-1\"\nname = \"hub\"\nhub = { fixed = true }\n", "hub.toml");
+  EXPECT_TRUE(scene.hub.fixed);
+  expect_round_trip(scene);
+}
+
+TEST(Scene, BodyFromAFileTakesOverridesButNoGeometry) {
+  const std::string entry = R"(format = "flexboom-scene-1"
+name = "with_file"
+hub = { fixed = true }
+[[bodies]]
+file = "boom4.toml"
+name = "probe"
+modes = 3
+)";
+  const std::string hinge =
+      "[[hinges]]\nbody = \"probe\"\npoint = [0, 0, 0]\nstowed = [1, 0, 0]\noutward = [0, 1, 0]\nP1 = 0\n";
+  const Scene scene = parse_scene(entry + hinge, "scene.toml", meshes);
+  EXPECT_EQ(scene.bodies.at(0).name, "probe");
+  EXPECT_EQ(scene.bodies.at(0).modes, 3);
+  EXPECT_EQ(scene.bodies.at(0).geometry.order, 8);
+  expect_round_trip(scene);
+  try {
+    parse_scene(entry + "order = 3\n" + hinge, "scene.toml", meshes);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("scene.toml:8:1: bodies[0].order: unknown key"), std::string::npos)
+        << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace flexboom

@@ -1,0 +1,83 @@
+#pragma once
+
+// A scene with everything, and ways to change it.
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+namespace flexboom {
+
+inline const std::filesystem::path meshes = std::filesystem::path(FLEXBOOM_TEST_DATA).parent_path() / "meshes";
+
+// A scene that uses every key away from its default.
+inline const char* const full_scene = R"(format = "flexboom-scene-1"
+name = "everything"
+duration = 3
+output_step = 0.1
+vtu_step = 0.5
+accuracy = { tolerance = 1e-3, outputs = ["hub.rate", "box.tip"], budget = false }
+integrator = { method = "adams", formulation = "relative", settle = 1e-7, rescale_at_events = true }
+orbit = { altitude = 5e5, inclination = 1.5, gravity = "differential", J2 = true }
+hub = { mass = 8.5, inertia = [0.1, 0.12, 0.05], fixed = false, size = [0.1, 0.2, 0.3] }
+initial = { rate = [0.1, -0.2, 0.3], velocity = [1, 2, 3e-3] }
+[[bodies]]
+name = "box"
+structure = "beam"
+modes = "auto"
+directions = "all"
+order = 3
+theory = "euler-bernoulli"
+shear = 0.85
+rotary_inertia = false
+backend = "dense"
+damping = { rule = "rayleigh", alpha = 0.1, beta = 1e-5 }
+[[bodies.segments]]
+shape = "rectangular-tube"
+height = 0.02
+width = 0.01
+thickness = 0.001
+length = 0.2
+elements = 3
+material = { E = 7e10, nu = 0.3, rho = 2700 }
+[[bodies.segments]]
+shape = "general"
+A = 1e-5
+Iy = 1e-10
+Iz = 2e-10
+J = 3e-10
+kappa_y = 0.8
+end = { A = 2e-5, kappa_z = 0.7 }
+length = 0.1
+material = { E = 7e10, nu = 0.3, rho = 2700 }
+[[bodies.attachments]]
+name = "head"
+position = "tip"
+mass = 0.1
+inertia = [[1e-4, 1e-6, 0], [1e-6, 1e-4, 0], [0, 0, 1e-4]]
+offset = [0.01, 0, 0]
+[[bodies.attachments]]
+position = 0.15
+mass = 0.01
+[[hinges]]
+body = "box"
+point = [0.05, 0, 0]
+stowed = [0.6, 0.8, 0]
+outward = [0, 0, 1]
+stiffness = 0.3
+rest = 1.5
+P2 = 0.02
+P3 = 11
+threshold = 1.4
+start_angle = 0.1
+start_rate = -0.1
+)";
+
+inline std::string with(std::string text, const std::string& from, const std::string& to) {
+  const size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+}  // namespace flexboom
