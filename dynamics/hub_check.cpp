@@ -14,9 +14,9 @@ void check_hub_inertia(const equations::Model& model, int p) {
   const std::vector<char> open(rest.size(), 0);
   const equations::HubSystem<double> hub =
       equations::condensed_hub(model, rest.data(), rest.data(), open, scratch, nullptr);
-  const Eigen::Matrix3d mass = spatial::eigen(hub.tt), J = spatial::eigen(hub.ww);
-  Eigen::Matrix3d coupling;
-  for (size_t r = 0; r < 3; ++r) coupling.row(static_cast<Eigen::Index>(r)) = spatial::eigen(hub.tw.row[r]).transpose();
+  const Eigen::Matrix<double, 6, 6> M = equations::mass_matrix(hub);
+  const Eigen::Matrix3d mass = M.topLeftCorner<3, 3>(), coupling = M.topRightCorner<3, 3>(),
+                        J = M.bottomRightCorner<3, 3>();
   const Eigen::Matrix3d left = J - coupling.transpose() * mass.ldlt().solve(coupling);
   const Eigen::Vector3d inertia =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>((left + left.transpose()) / 2).eigenvalues();

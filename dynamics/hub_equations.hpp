@@ -118,6 +118,16 @@ HubSystem<T> bare_hub(const Model& model, const Vec3<T>& w) {
   return hub;
 }
 
+/// Of the hub with everything on it, about its origin, hub axes: acceleration, then angular acceleration.
+inline Eigen::Matrix<double, 6, 6> mass_matrix(const HubSystem<double>& hub) {
+  Eigen::Matrix<double, 6, 6> M;
+  M.topLeftCorner<3, 3>() = spatial::eigen(hub.tt);
+  M.bottomRightCorner<3, 3>() = spatial::eigen(hub.ww);
+  for (int i = 0; i < 3; ++i) M.block<1, 3>(i, 3) = spatial::eigen(hub.tw.row[static_cast<size_t>(i)]).transpose();
+  M.bottomLeftCorner<3, 3>() = M.topRightCorner<3, 3>().transpose();
+  return M;
+}
+
 /// Force and torque of gravity on the hub alone, about its origin, hub axes.
 struct GravityOnHub {
   Vec3<double> force, torque;

@@ -94,15 +94,6 @@ void responses(const equations::SideBySide<C>& bodies, equations::SideBySideScra
   }
 }
 
-Eigen::Matrix<double, 6, 6> mass_matrix(const equations::HubSystem<double>& hub) {
-  Eigen::Matrix<double, 6, 6> M;
-  M.topLeftCorner<3, 3>() = spatial::eigen(hub.tt);
-  M.bottomRightCorner<3, 3>() = spatial::eigen(hub.ww);
-  for (int i = 0; i < 3; ++i) M.block<1, 3>(i, 3) = spatial::eigen(hub.tw.row[static_cast<size_t>(i)]).transpose();
-  M.bottomLeftCorner<3, 3>() = M.topRightCorner<3, 3>().transpose();
-  return M;
-}
-
 }  // namespace
 
 // The hub's equations M(x) (a, alpha) = f(x), the bodies' own accelerations = g(x) + R(x) (a, alpha): with slopes at
@@ -134,7 +125,7 @@ void System::jacobian(const double* y, std::span<const char> contact, Workspace&
       w.hub_columns(k, l.p + i) += direction(component(bare.ft, k), i);
       w.hub_columns(3 + k, l.p + i) += direction(component(bare.fw, k), i);
     }
-  mass_matrix(hub).llt().solveInPlace(w.hub_columns);
+  equations::mass_matrix(hub).llt().solveInPlace(w.hub_columns);
   equations::for_each_side_by_side(model, w.scratch,
                                    [&w](const auto& bodies, auto& s) { responses(bodies, s, w.response); });
   w.dudot.bottomRows(l.p) += w.response.lazyProduct(w.hub_columns);
