@@ -14,20 +14,52 @@ struct Clearance {
 inline constexpr double no_crossing = 2;
 inline constexpr double crossed_from_the_start = 3;
 
-/// Newton in a bracket: clear at a, crossed at b. `at(c)` gives the Clearance.
+/// The cubic through the values and slopes of two places.
+class Hermite {
+ public:
+  Hermite(const Clearance& from, const Clearance& to)
+      : from_(from),
+        width_(to.c - from.c),
+        d0_(from.slope * width_),
+        c2_(3 * (to.value - from.value) - 2 * d0_ - to.slope * width_),
+        c3_(2 * (from.value - to.value) + d0_ + to.slope * width_) {}
+
+  Clearance operator()(double c) const {
+    const double s = (c - from_.c) / width_;
+    return {c, from_.value + s * (d0_ + s * (c2_ + s * c3_)), (d0_ + s * (2 * c2_ + s * 3 * c3_)) / width_};
+  }
+
+  /// Where it is lowest; before or behind everything where it has no dip.
+  double bottom() const {
+    const double root = c2_ * c2_ - 3 * c3_ * d0_;
+    return root < 0 ? no_crossing : from_.c - width_ * d0_ / (c2_ + std::sqrt(root));
+  }
+
+ private:
+  Clearance from_;
+  double width_, d0_, c2_, c3_;
+};
+
+/// Newton from c in a bracket: clear at a, crossed at b. `at(c)` gives the Clearance.
 template <class At>
-double crossing_in_bracket(const At& at, double a, double b, double resolution) {
-  double c = b;
+double newton_in_bracket(const At& at, double a, double b, double c, double resolution) {
   for (int round = 0; round < 100; ++round) {
     const Clearance here = at(c);
     (here.value < 0 ? b : a) = c;
     double next = here.slope < 0 ? c - here.value / here.slope : 0.5 * (a + b);
+    if (std::abs(next - c) <= resolution) return std::clamp(next, a, b);
     if (!(next > a && next < b)) next = 0.5 * (a + b);
-    const double moved = std::abs(next - c);
     c = next;
-    if (moved <= resolution || b - a <= resolution) break;
+    if (b - a <= resolution) break;
   }
   return c;
+}
+
+/// Between a place that is clear and one that is crossed; the first guess is where the cubic crosses.
+template <class At>
+double crossing_in_bracket(const At& at, const Clearance& from, const Clearance& to, double resolution) {
+  const double guess = newton_in_bracket(Hermite(from, to), from.c, to.c, to.c, 1e-3 * (to.c - from.c));
+  return newton_in_bracket(at, from.c, to.c, guess, resolution);
 }
 
 /// The first crossing between two places so near that the clearance has at most one dip between them, or one of the
@@ -35,25 +67,25 @@ double crossing_in_bracket(const At& at, double a, double b, double resolution) 
 template <class At>
 double crossing_between(const At& at, const Clearance& from, const Clearance& to, double resolution) {
   if (to.value < 0) {
-    if (from.value > 0) return crossing_in_bracket(at, from.c, to.c, resolution);
-    double c = 0.5 * (from.c + to.c);
-    for (int tries = 0; tries < 60; ++tries, c = 0.5 * (from.c + c))
-      if (at(c).value > 0) return crossing_in_bracket(at, c, to.c, resolution);  // it starts on the stop and comes off
+    if (from.value > 0) return crossing_in_bracket(at, from, to, resolution);
+    Clearance beyond = to;
+    for (int tries = 0; tries < 60; ++tries) {
+      const Clearance here = at(0.5 * (from.c + beyond.c));
+      if (here.value > 0) return crossing_in_bracket(at, here, beyond, resolution);  // it comes off the stop
+      beyond = here;
+    }
     return crossed_from_the_start;
   }
   if (!(from.slope < 0 && to.slope > 0)) return no_crossing;
-  // The cubic through values and slopes says whether the dip is worth following to its bottom, where the slope is zero.
-  const double width = to.c - from.c, d0 = from.slope * width, d1 = to.slope * width;
-  const double c3 = 2 * (from.value - to.value) + d0 + d1, c2 = 3 * (to.value - from.value) - 2 * d0 - d1;
-  const double root = c2 * c2 - 3 * c3 * d0;
-  if (root < 0) return no_crossing;
-  const double s = std::clamp(-d0 / (c2 + std::sqrt(root)), 0.0, 1.0);
-  if (from.value + s * (d0 + s * (c2 + s * c3)) > 0.5 * std::min(from.value, to.value)) return no_crossing;
+  // The cubic says whether the dip is worth following to its bottom, where the slope is zero.
+  const Hermite cubic(from, to);
+  if (cubic.bottom() == no_crossing) return no_crossing;
+  double c = std::clamp(cubic.bottom(), from.c, to.c);
+  if (cubic(c).value > 0.5 * std::min(from.value, to.value)) return no_crossing;
   Clearance a = from, b = to;
-  double c = from.c + s * width;
   for (int round = 0; round < 60 && c > a.c && c < b.c; ++round) {
     const Clearance here = at(c);
-    if (here.value < 0) return crossing_in_bracket(at, from.c, c, resolution);
+    if (here.value < 0) return crossing_in_bracket(at, from, here, resolution);
     (here.slope < 0 ? a : b) = here;
     if (std::min(a.value, b.value) + std::max(a.slope * (b.c - a.c), -b.slope * (b.c - a.c)) > 0)
       return no_crossing;  // a convex dip stays above its tangents
