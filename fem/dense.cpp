@@ -14,6 +14,9 @@ extern "C" void dsyrk_(const char* uplo, const char* trans, const int* n, const 
 extern "C" void dgeev_(const char* left, const char* right, const int* n, double* a, const int* lda, double* real,
                        double* imaginary, double* left_vectors, const int* ld_left, double* right_vectors,
                        const int* ld_right, double* work, const int* work_size, int* info);
+extern "C" void dgetrf_(const int* m, const int* n, double* a, const int* lda, int* pivots, int* info);
+extern "C" void dgetri_(const int* n, double* a, const int* lda, const int* pivots, double* work, const int* work_size,
+                        int* info);
 
 namespace flexboom {
 
@@ -76,6 +79,22 @@ RealEigenvectors eigenvectors(MatrixXd A) {
   if (info != 0 || !result.vectors.allFinite())
     throw NumericalError(fmt::format("eigenvectors: LAPACK failed ({}) on a matrix of {} rows", info, n));
   return result;
+}
+
+MatrixXd inverse(MatrixXd A) {
+  require(A.rows() == A.cols(), fmt::format("inverse: the matrix is {} x {}", A.rows(), A.cols()));
+  const auto n = static_cast<int>(A.rows());
+  if (n == 0) return A;
+  const OneBlasThread alone;
+  Eigen::VectorXi pivots(n);
+  int info = 0;
+  dgetrf_(&n, &n, A.data(), &n, pivots.data(), &info);
+  constexpr int panel = 64;
+  const int size = panel * n;
+  Eigen::VectorXd work(size);
+  if (info == 0) dgetri_(&n, A.data(), &n, pivots.data(), work.data(), &size, &info);
+  if (info != 0) throw NumericalError(fmt::format("inverse: a pivot is zero ({}) in a matrix of {} rows", info, n));
+  return A;
 }
 
 }  // namespace flexboom

@@ -31,4 +31,7 @@ struct RealEigenvectors {
 /// By LAPACK. @throws NumericalError when it does not converge.
 RealEigenvectors eigenvectors(Eigen::MatrixXd A);
 
+/// By LAPACK. @throws NumericalError when a pivot is zero.
+Eigen::MatrixXd inverse(Eigen::MatrixXd A);
+
 }  // namespace flexboom
