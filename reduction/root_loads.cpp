@@ -69,9 +69,10 @@ BodyMomenta momenta(const ReducedBody& body, const Vector3d& v, const Vector3d& 
   }
   for (Index k = 0; k < body.n(); ++k) {
     const auto kk = static_cast<size_t>(k);
-    J += q(k) * body.J1[kk];
+    Matrix3d slope = body.J1[kk] + q(k) * body.J2[kk][kk];
+    for (Index l = 0; l < k; ++l) slope += 2 * q(l) * body.J2[kk][static_cast<size_t>(l)];  // symmetric in k and l
+    J += q(k) * slope;
     turned += q(k) * body.Cr1[kk].lazyProduct(q_dot);
-    for (Index l = 0; l < body.n(); ++l) J += q(k) * q(l) * body.J2[kk][static_cast<size_t>(l)];
   }
   // P = m v + w x mc + Ct q_dot, H = mc x v + J w + Cr q_dot, 2 T = v . P + w . H + q_dot . (Ct^T v + Cr^T w + Me
   // q_dot)
