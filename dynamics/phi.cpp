@@ -1,8 +1,7 @@
 #include "dynamics/phi.hpp"
 
+#include "dynamics/complex_exp.hpp"
 #include "fem/lanes.hpp"
-
-#include <cmath>
 
 namespace flexboom {
 
@@ -80,11 +79,7 @@ void downward(const SmallOnes& w, Index m, Index last, double* phi) {
 void phi_functions(double scale, const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::Ref<const Eigen::VectorXd>& y,
                    Eigen::Ref<Eigen::MatrixXd> phi) {
   const Index m = x.size(), last = phi.cols() - 1;
-  for (Index i = 0; i < m; ++i) {
-    const double e = std::exp(scale * x[i]), turn = scale * y[i];
-    phi(i, 0) = turn == 0 ? e : e * std::cos(turn);
-    phi(m + i, 0) = turn == 0 ? 0 : e * std::sin(turn);
-  }
+  complex_exp(m, scale, x.data(), y.data(), phi.data());
   if (last < 1) return;
   upward(m, last, scale, x.data(), y.data(), phi.data());
   SmallOnes small;
