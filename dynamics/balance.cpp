@@ -72,4 +72,37 @@ Balance System::balance(const Eigen::Ref<const VectorXd>& y) const {
   return totals.balance;
 }
 
+Whole System::whole(const Eigen::Ref<const VectorXd>& y) const {
+  const Layout& l = layout();
+  const Vector3d omega = y.segment<3>(l.u_begin());
+  // What |r + b|^2 I - (r + b) (r + b)^T has beyond those of r and of b.
+  const auto crossed = [](const Vector3d& r, const Vector3d& b) -> Matrix3d {
+    return 2 * r.dot(b) * Matrix3d::Identity() - r * b.transpose() - b * r.transpose();
+  };
+  double m = hub().m;
+  Vector3d moment = hub().mc0, rate = Vector3d::Zero();
+  Matrix3d J = hub().J0;
+  for (size_t i = 0; i < appendages().size(); ++i) {
+    const Appendage& a = appendages()[i];
+    const ReducedBody& b = a.body;
+    const int at = l.body[i], turn = l.u_begin() + l.base + at;
+    const Matrix3d C = boom_to_hub(static_cast<int>(i), y[at] + a.hinge.mechanism.threshold);
+    Vector3d mc = b.mc0, mc_rate = Vector3d::Zero();
+    Matrix3d own = b.J0;
+    for (int k = 0; k < b.n(); ++k) {
+      mc += b.Ct.col(k) * y[at + 1 + k];
+      mc_rate += b.Ct.col(k) * y[turn + 1 + k];
+      own += b.J1[static_cast<size_t>(k)] * y[at + 1 + k];
+    }
+    const Vector3d& d = a.hinge.point;
+    const Vector3d out = C * mc;
+    m += b.m;
+    moment += b.m * d + out;
+    rate += C * (y[turn] * Vector3d::UnitZ().cross(mc) + mc_rate);
+    J += C * own * C.transpose() + crossed(d, out) + 0.5 * b.m * crossed(d, d);
+  }
+  const Vector3d c = moment / m;
+  return {c, omega.cross(c) + rate / m, J - 0.5 * m * crossed(c, c)};
+}
+
 }  // namespace flexboom

@@ -11,7 +11,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
+#include <optional>
 
 namespace flexboom {
 namespace {
@@ -71,12 +73,14 @@ class ExponentialStepper final : public Stepper {
   void restart(double t, const VectorXd& y, std::span<const char> contact, std::span<const char> armed) override {
     step_.start = t;
     pending_ = false;
+    if (!angular_momentum_) angular_momentum_ = system_.balance(y).angular_momentum;
     contact_.assign(contact.begin(), contact.end());
     armed_.assign(armed.begin(), armed.end());
     step_.linear = &linear_part();
     begin(y);
     first_ = true;
-    h_ = step_.linear->step > 0 ? step_.linear->step : first_step();
+    h_ = first_step();
+    if (step_.linear->step > 0) h_ = std::min(h_, step_.linear->step);
   }
 
   void step(double t_end, double& t, VectorXd& y, std::span<int> crossed) override {
@@ -103,7 +107,6 @@ class ExponentialStepper final : public Stepper {
       h_ = std::isfinite(error) ? smaller(error) : on_ladder(step_.length / (rung * rung));
       if (!std::isfinite(error)) relinearise(failures < 6 ? 1e-3 : 1e-9);
     }
-    follow();
     end_ = search_.first_crossing(step_, contact_, armed_, crossed);
     if (end_ > 0)
       state_at(end_, y);
@@ -111,9 +114,30 @@ class ExponentialStepper final : public Stepper {
       y = start_;
     t = step_.start + end_ * step_.length;
     if (end_ == 1 && step_.length == t_end - step_.start) t = t_end;
+    kept_ = keep_momentum(y);
+    if (!kept_.isZero(0)) place(end_, y);
     pending_ = true;
     reached_ = t;
     reached_state_ = y;
+  }
+
+  /// By the linear part alone, with the remainder as it is at the start.
+  void foresee(double t_end, const std::function<void(const VectorXd& y)>& look) override {
+    const double left = t_end - step_.start;
+    step_.M.setZero();
+    VectorXd y = start_;
+    for (double t = left; t > 1e-10 * left; t /= 2) {
+      step_.M.col(0) = t * N_.col(0);
+      step_.linear->point(1, t, scratch_);
+      step_.linear->combine(scratch_, 0, step_.Z.col(0), step_.M, integral_);
+      step_.linear->to_x(integral_, y.head(nx_));
+      if (!system_.fixed_hub()) {
+        step_.linear->combine(scratch_, 1, step_.Z.col(0), step_.M, integral_);
+        turn(start_.segment<4>(layout_.attitude()), t * step_.linear->omega_modes.lazyProduct(integral_), y);
+        place(com_, com_velocity_, y);
+      }
+      if (y.allFinite()) look(y);
+    }
   }
 
   void interpolate(double t, VectorXd& y) override { state_at((t - step_.start) / step_.length, y); }
@@ -148,7 +172,21 @@ class ExponentialStepper final : public Stepper {
     constexpr double pull = 1e-6;
     for (int i = 0; i < layout_.p; ++i)
       if (J.col(i).cwiseAbs().maxCoeff() < pull) J(layout_.p + layout_.base + i, i) -= pull;
-    return std::make_unique<LinearPart>(std::move(J), work_->dahub, system_.fixed_hub() ? -1 : layout_.p, p);
+    if (p.isZero())
+      if (const auto [other, hinge] = neighbour(); other != nullptr)
+        return std::make_unique<LinearPart>(*other, std::move(J), layout_.body[hinge]);
+    return std::make_unique<LinearPart>(std::move(J), system_.fixed_hub() ? -1 : layout_.p, p);
+  }
+
+  /// A linear part at rest that differs in one stop, and which.
+  std::pair<const LinearPart*, size_t> neighbour() const {
+    for (const auto& [contact, part] : linear_parts_) {
+      if (!part || !part->base.isZero()) continue;
+      const auto [here, there] = std::ranges::mismatch(contact_, contact);
+      if (here != contact_.end() && std::equal(here + 1, contact_.end(), there + 1))
+        return {part.get(), static_cast<size_t>(here - contact_.begin())};
+    }
+    return {};
   }
 
   /// Takes L where the step starts, unless it was taken near there (a part of p): that costs as much as some steps.
@@ -178,8 +216,9 @@ class ExponentialStepper final : public Stepper {
     step_.M.resize(m, points);
     N_.resize(m, points);
     integral_.resize(m);
-    small_product(step_.linear->to_modes, y.head(nx_), step_.Z.leftCols(1));
+    step_.linear->to_z(y.head(nx_), step_.Z.leftCols(1));
     step_.X.col(0) = y.head(nx_);
+    take_mass_centre();
     evaluate(0);
     step_.linear->remainder(F_.leftCols(1), step_.Z.leftCols(1), N_.leftCols(1));
   }
@@ -190,14 +229,43 @@ class ExponentialStepper final : public Stepper {
     step_.start = reached_;
     start_ = reached_state_;
     step_.Z.col(0) = step_.Z.col(degree).eval();
-    step_.X.col(0) = step_.X.col(degree).eval();
+    step_.X.col(0) = reached_state_.head(nx_);
     N_.col(0) = N_.col(degree).eval();
-    acceleration_.col(0) = acceleration_.col(degree).eval();
+    gravity_.col(0) = gravity_.col(degree).eval();
+    if (!kept_.isZero(0)) step_.Z.col(0) += step_.linear->to_modes.middleCols<3>(layout_.p) * kept_;
+    take_mass_centre();
     power_[0] = power_[degree];
     first_ = false;
   }
 
-  /// F, hub acceleration (hub axes) and dissipated power at point j.
+  /// What only the outside could change is as it was at the start: angular momentum. A wrong attitude is turned, a
+  /// wrong rate is made faster or slower, each by its size; where there is a momentum, mostly the attitude, for that
+  /// acts back on nothing. Returns what it added to omega.
+  Vector3d keep_momentum(VectorXd& y) {
+    if (system_.fixed_hub() || system_.field()) return Vector3d::Zero();
+    const double rate = 0.01 * scale_.scale[layout_.p], angle = 2 * scale_.scale[layout_.attitude()];
+    const Eigen::Matrix3d A = rotation_matrix(y.segment<4>(layout_.attitude())), J = system_.whole(y).inertia;
+    const Vector3d H = A.transpose() * system_.balance(y).angular_momentum;
+    const Vector3d lost = A.transpose() * *angular_momentum_ - H;
+    // The least (added / rate)^2 + (turned / angle)^2 for which J added + turned x H = lost.
+    const Eigen::Matrix3d W = rate * rate * J * J.transpose() +
+                              angle * angle * (H.squaredNorm() * Eigen::Matrix3d::Identity() - H * H.transpose());
+    const Vector3d pull = W.ldlt().solve(lost), added = rate * rate * J.transpose() * pull;
+    y.segment<3>(layout_.p) += added;
+    turn(y.segment<4>(layout_.attitude()), angle * angle * H.cross(pull), y);
+    return added;
+  }
+
+  /// Of the start.
+  void take_mass_centre() {
+    if (system_.fixed_hub()) return;
+    const Whole whole = system_.whole(start_);
+    const Eigen::Matrix3d A = rotation_matrix(start_.segment<4>(layout_.attitude()));
+    com_ = start_.segment<3>(layout_.position()) + A * whole.mass_centre;
+    com_velocity_ = start_.segment<3>(layout_.velocity()) + A * whole.velocity;
+  }
+
+  /// F, gravity at the mass centre (inertial axes) and dissipated power at point j.
   void evaluate(int j) {
     if (system_.field()) {
       if (j == 0)
@@ -211,24 +279,24 @@ class ExponentialStepper final : public Stepper {
     ++counts_.rhs_evaluations;
     F_.col(j) = y_dot_.head(nx_);
     power_[j] = y_dot_[layout_.dissipated()];
-    if (system_.fixed_hub()) return;
-    acceleration_.col(j) = y_dot_.segment<3>(layout_.velocity());
-    if (system_.field())
-      acceleration_.col(j) = rotation_matrix(y_.segment<4>(layout_.attitude())).transpose() * acceleration_.col(j);
+    if (!system_.field()) return;
+    const LocalGravity g = system_.field()->at(t, y_.segment<3>(layout_.position()));
+    const Eigen::Matrix3d A = rotation_matrix(y_.segment<4>(layout_.attitude()));
+    gravity_.col(j) = g.at(A * system_.whole(y_).mass_centre).acceleration;
   }
 
   /// Sweeps until the points stand still; returns the error in units of the one allowed, infinite when they do not.
   double solve(double left) {
     const Index m = step_.linear->size();
     predict();
-    acceleration_.rightCols<degree>().colwise() = acceleration_.col(0).eval();  // a failed step left what it had
+    gravity_.rightCols<degree>().colwise() = gravity_.col(0).eval();  // a failed step left what it had
     double last_change = 0;
     for (int sweep = 0; sweep < max_sweeps; ++sweep) {
       small_product(N_, step_.length * scaled_coefficients_, step_.M);
       for (int j = 1; j < points; ++j)
         step_.linear->combine(step_.grid->at[static_cast<size_t>(j)], 0, step_.Z.col(0), step_.M, step_.Z.col(j));
       previous_ = step_.X.col(degree);
-      small_product(step_.linear->from_modes, step_.Z.rightCols(degree), step_.X.rightCols(degree));
+      step_.linear->to_x(step_.Z.rightCols(degree), step_.X.rightCols(degree));
       const double change =
           sweep == 0 ? std::numeric_limits<double>::infinity() : norm(step_.X.col(degree) - previous_);
       if (!std::isfinite(change) && sweep > 0) return change;
@@ -242,6 +310,7 @@ class ExponentialStepper final : public Stepper {
       for (int j = 1; j < points; ++j) evaluate(j);
       step_.linear->remainder(F_.rightCols(degree), step_.Z.rightCols(degree), N_.rightCols(degree));
     }
+    follow();
     // What the middle point adds to the interpolation by the others.
     const Points& d = collocation::middle_difference();
     error_modes_.noalias() = N_ * d;
@@ -250,16 +319,18 @@ class ExponentialStepper final : public Stepper {
     M_error_.noalias() = step_.length * error_modes_ * middle_.transpose();
     step_.linear->combine(step_.grid->at[degree], 0, zero_, M_error_, z_error_);
     x_error_.resize(nx_);
-    small_product(step_.linear->from_modes, z_error_, x_error_);
+    step_.linear->to_x(z_error_, x_error_);
     double error = norm(x_error_);
     const double weight = step_.length * collocation::middle_polynomial().dot(collocation::integrals(1));
     const double lost = std::abs(power_.dot(d)) * weight;
     if (!system_.fixed_hub()) {
-      // What the hub's rate keeps of the error turns it until the end.
-      const double turned = (step_.linear->drift_modes.lazyProduct(z_error_)).norm() * left;
+      // What the hub's rate keeps of the error turns it: until the end, or until momentum takes it back.
+      const double turning = system_.field() ? left : step_.length;
+      const double turned =
+          (step_.linear->drift_modes.lazyProduct(z_error_)).norm() * turning + (turning_ * d).norm() * weight;
       error = std::max(error, turned / (2 * scale_.tolerance * scale_.scale[layout_.attitude()]));
-      const Vector3d pushed = (acceleration_ - step_.linear->a_hub * step_.X) * d;  // and its speed carries it away
-      error = std::max(error, pushed.norm() * weight * left / (scale_.tolerance * scale_.scale[layout_.position()]));
+      const double fallen = (gravity_ * d).norm() * weight * left;  // and the speed of the mass centre carries it away
+      error = std::max(error, fallen / (scale_.tolerance * scale_.scale[layout_.position()]));
     }
     error = std::max(error, lost / (scale_.tolerance * scale_.scale[layout_.dissipated()]));
     return error;
@@ -286,9 +357,10 @@ class ExponentialStepper final : public Stepper {
     last_used_ = step_.length;
     if (last) return;
     const double growth = std::pow(std::max(error, 1e-10), -1.0 / (degree + 1));
-    // Up to four times: after a stop the first steps follow what decays at once.
-    if (growth > 1.25 * rung) h_ = on_ladder(step_.length * (growth > 4 ? std::min(4.0, growth / 2) : rung));
-    if (first_) step_.linear->step = step_.length;
+    // Half of what the error allows, up to four times: after a stop the first steps follow what decays at once.
+    if (growth > 1.25 * rung) h_ = on_ladder(step_.length * std::clamp(growth / 2, rung, 4.0));
+    // What the next restart with these stops tries: a failed step costs less than many short ones.
+    if (first_) step_.linear->step = error < 1e-3 ? 8 * step_.length : step_.length;
   }
   double smaller(double error) const {
     double h = step_.length;
@@ -296,12 +368,13 @@ class ExponentialStepper final : public Stepper {
     return on_ladder(h);
   }
 
-  /// What follows p and u: attitude, velocity, position, dissipated energy. It acts back in a field of gravity only.
+  /// What follows p and u: attitude, motion of the mass centre, dissipated energy. It acts back in a field of gravity
+  /// only.
   void follow() {
     const auto to_coefficients = collocation::coefficients();
     power_coefficients_ = to_coefficients.transpose() * power_;
     if (system_.fixed_hub()) return;
-    Eigen::Matrix<double, 3, points> omega, theta0, theta, C;
+    Matrix3Points omega, theta0, theta;
     omega = step_.X.middleRows<3>(layout_.p);
     theta0.col(0).setZero();
     for (int j = 1; j < points; ++j) {
@@ -310,8 +383,8 @@ class ExponentialStepper final : public Stepper {
     }
     theta = theta0;
     for (int round = 0; round < 20; ++round) {
-      for (int j = 0; j < points; ++j) C.col(j) = turning(theta.col(j), omega.col(j));
-      C_.noalias() = C * to_coefficients;
+      for (int j = 0; j < points; ++j) turning_.col(j) = turning(theta.col(j), omega.col(j));
+      C_.noalias() = turning_ * to_coefficients;
       double change = 0;
       for (int j = 1; j < points; ++j) {
         const Vector3d next = theta0.col(j) + step_.length * (C_ * collocation::integrals(collocation::node(j)));
@@ -320,11 +393,7 @@ class ExponentialStepper final : public Stepper {
       }
       if (change <= 1e-16) break;
     }
-    for (int j = 0; j < points; ++j) {
-      const Eigen::Matrix3d A = rotation_matrix(quaternion_of(theta.col(j)));
-      G_values_.col(j) = A * acceleration_.col(j) - step_.linear->a_hub * step_.X.col(j);
-    }
-    G_.noalias() = G_values_ * to_coefficients;
+    falling_.noalias() = gravity_ * to_coefficients;
   }
 
   /// The state at a fraction c of the step.
@@ -335,23 +404,33 @@ class ExponentialStepper final : public Stepper {
   void state_at(const GridPoint& at, double c, VectorXd& y) {
     y.resize(layout_.size);
     step_.linear->combine(at, 0, step_.Z.col(0), step_.M, integral_);
-    small_product(step_.linear->from_modes, integral_, y.head(nx_));
+    step_.linear->to_x(integral_, y.head(nx_));
     y[layout_.dissipated()] =
         start_[layout_.dissipated()] + step_.length * power_coefficients_.dot(collocation::integrals(c));
     if (system_.fixed_hub()) return;
     const auto I = collocation::integrals(c);
     step_.linear->combine(at, 1, step_.Z.col(0), step_.M, integral_);
     const Vector3d theta = step_.length * (step_.linear->omega_modes.lazyProduct(integral_) + C_ * I);
-    const Vector4d attitude = start_.segment<4>(layout_.attitude());
-    const Eigen::Matrix3d A = rotation_matrix(attitude);
-    y.segment<4>(layout_.attitude()) = quaternion_product(attitude, quaternion_of(theta));
-    const Vector3d dv = step_.length * (step_.linear->a_hub_modes.lazyProduct(integral_) + G_ * I);
-    step_.linear->combine(at, 2, step_.Z.col(0), step_.M, integral_);
-    const Vector3d dr = step_.length * step_.length *
-                        (step_.linear->a_hub_modes.lazyProduct(integral_) + G_ * collocation::double_integrals(c));
-    const Vector3d v0 = start_.segment<3>(layout_.velocity());
-    y.segment<3>(layout_.velocity()) = v0 + A * dv;
-    y.segment<3>(layout_.position()) = start_.segment<3>(layout_.position()) + c * step_.length * v0 + A * dr;
+    turn(start_.segment<4>(layout_.attitude()), theta, y);
+    place(c, y);
+  }
+
+  /// The attitude: one before, turned by a rotation vector.
+  void turn(const Vector4d& before, const Vector3d& theta, VectorXd& y) const {
+    y.segment<4>(layout_.attitude()) = quaternion_product(before, quaternion_of(theta));
+  }
+
+  /// The hub at a fraction c of the step, by p, u and attitude: forces between the bodies do not move the mass centre.
+  void place(double c, VectorXd& y) const {
+    const Vector3d fallen = step_.length * (falling_ * collocation::double_integrals(c));
+    place(com_ + step_.length * (c * com_velocity_ + fallen),
+          com_velocity_ + step_.length * (falling_ * collocation::integrals(c)), y);
+  }
+  void place(const Vector3d& com, const Vector3d& com_velocity, VectorXd& y) const {
+    const Whole whole = system_.whole(y);
+    const Eigen::Matrix3d A = rotation_matrix(y.segment<4>(layout_.attitude()));
+    y.segment<3>(layout_.velocity()) = com_velocity - A * whole.velocity;
+    y.segment<3>(layout_.position()) = com - A * whole.mass_centre;
   }
 
   const System& system_;
@@ -375,8 +454,11 @@ class ExponentialStepper final : public Stepper {
   Points power_ = Points::Zero(), power_coefficients_ = Points::Zero();
   Points middle_ = Points::Zero();
   collocation::Table scaled_coefficients_;
-  Matrix3Points G_ = Matrix3Points::Zero(), C_ = Matrix3Points::Zero(), G_values_ = Matrix3Points::Zero(),
-                acceleration_ = Matrix3Points::Zero();
+  Vector3d com_ = Vector3d::Zero(), com_velocity_ = Vector3d::Zero();
+  Vector3d kept_ = Vector3d::Zero();
+  std::optional<Vector3d> angular_momentum_;
+  Matrix3Points turning_ = Matrix3Points::Zero(), C_ = Matrix3Points::Zero(), gravity_ = Matrix3Points::Zero(),
+                falling_ = Matrix3Points::Zero();
   StepCounts counts_;
 };
 

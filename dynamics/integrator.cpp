@@ -47,25 +47,19 @@ class Scales {
   const ErrorScale& error() const { return error_; }
 
   void observe(const VectorXd& y) {
-    const Layout& l = system_.layout();
-    for (size_t i = 0; i < l.body.size(); ++i) {
-      const int at = l.body[i], rate = l.p + l.base + at, n = system_.appendages()[i].body.n();
-      // Gap and rate measure each other: at the stop the gap is zero but the motion is not.
-      raise(at, std::max(std::abs(y[at]), std::abs(y[rate]) * period_[i]));
-      raise(rate, std::max(std::abs(y[rate]), std::abs(y[at]) / period_[i]));
-      for (int k = 1; k <= n; ++k) {
-        raise(at + k, std::abs(y[at + k]));
-        raise(rate + k, std::abs(y[rate + k]));
-      }
-    }
-    raise(l.dissipated(), std::abs(y[l.dissipated()]));
-    if (system_.fixed_hub()) return;
-    for (const int first : {l.u_begin(), l.position(), l.velocity()}) {
-      const double size = y.segment<3>(first).norm();
-      for (int k = 0; k < 3; ++k) raise(first + k, size);
-    }
-    const double angle = rotation_from_start(y).norm();
-    for (int k = 0; k < 4; ++k) raise(l.attitude() + k, std::min(1.0, 0.5 * angle));
+    for_each_size(y, [&](int i, double size) {
+      if (size <= largest_[i]) return;
+      largest_[i] = size;
+      error_.scale[i] = std::max(size, rescale_ ? error_.scale[i] : floor_[i]);
+    });
+  }
+
+  /// Of a state that may come: a tenth of it counts, and no more than a tenth of what the energy could make.
+  void foresee(const VectorXd& y) {
+    for_each_size(y, [&](int i, double size) {
+      floor_[i] = std::max(floor_[i], 0.1 * std::min(size, bound_[i]));
+      error_.scale[i] = std::max(error_.scale[i], floor_[i]);
+    });
   }
 
   /// Forgets the past of the hinges when asked to measure their error against recent motion.
@@ -78,16 +72,41 @@ class Scales {
   }
 
  private:
+  /// each(i, size) for every state.
+  template <class Each>
+  void for_each_size(const VectorXd& y, const Each& each) {
+    const Layout& l = system_.layout();
+    for (size_t i = 0; i < l.body.size(); ++i) {
+      const int at = l.body[i], rate = l.p + l.base + at, n = system_.appendages()[i].body.n();
+      // Gap and rate measure each other: at the stop the gap is zero but the motion is not.
+      each(at, std::max(std::abs(y[at]), std::abs(y[rate]) * period_[i]));
+      each(rate, std::max(std::abs(y[rate]), std::abs(y[at]) / period_[i]));
+      // Elastic coordinates by energy: what the one with the most has, were it in this one.
+      const ReducedBody& body = system_.appendages()[i].body;
+      double held = 0;
+      for (int k = 0; k < n; ++k) {
+        const double q = y[at + 1 + k], v = y[rate + 1 + k];
+        held = std::max(held, body.Ke(k, k) * q * q + body.Me(k, k) * v * v);
+      }
+      for (int k = 0; k < n; ++k) {
+        each(at + 1 + k, std::sqrt(held / body.Ke(k, k)));
+        each(rate + 1 + k, std::sqrt(held / body.Me(k, k)));
+      }
+    }
+    each(l.dissipated(), std::abs(y[l.dissipated()]));
+    if (system_.fixed_hub()) return;
+    for (const int first : {l.u_begin(), l.position(), l.velocity()}) {
+      const double size = y.segment<3>(first).norm();
+      for (int k = 0; k < 3; ++k) each(first + k, size);
+    }
+    const double angle = rotation_from_start(y).norm();
+    for (int k = 0; k < 4; ++k) each(l.attitude() + k, std::min(1.0, 0.5 * angle));
+  }
+
   Vector3d rotation_from_start(const VectorXd& y) const {
     Vector4d back = start_attitude_;
     back.tail<3>() *= -1;
     return rotation_vector(quaternion_product(back, y.segment<4>(system_.layout().attitude())));
-  }
-
-  void raise(int i, double size) {
-    if (size <= largest_[i]) return;
-    largest_[i] = size;
-    error_.scale[i] = std::max(size, rescale_ ? error_.scale[i] : floor_[i]);
   }
 
   /// A small part of the values that all the energy at the start could give each state.
@@ -122,6 +141,7 @@ class Scales {
       // A quaternion's entries are near 1: less than its round-off can not be asked for.
       floor_.segment<4>(l.attitude()).setConstant(std::max(turn, 1e-14 / error_.tolerance));
     }
+    bound_ = floor_ / part;
     error_.scale = floor_;
   }
 
@@ -129,7 +149,7 @@ class Scales {
   bool rescale_;
   Vector4d start_attitude_;
   std::vector<double> period_;
-  VectorXd floor_, largest_;
+  VectorXd floor_, bound_, largest_;
   ErrorScale error_;
 };
 
@@ -179,6 +199,7 @@ class Flight {
     const Stopwatch start;
     record(t_, y_);
     stepper_->restart(t_, y_, contacts_.closed, contacts_.armed);
+    stepper_->foresee(options_.duration, [this](const VectorXd& y) { scales_.foresee(y); });
     while (t_ < options_.duration && !stopped()) advance();
     finish(start.seconds());
     return std::move(result_);

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -82,6 +83,9 @@ class Stepper {
   /// One step, not beyond t_end. Fills t and y, and crossed[i] with +1 (gap rises through zero), -1 or 0. When
   /// something was crossed, (t, y) is there.
   virtual void step(double t_end, double& t, Eigen::VectorXd& y, std::span<int> crossed) = 0;
+  /// States that the motion may come near until t_end, as far as that is known without flying there: sizes to weigh
+  /// errors by. After a restart.
+  virtual void foresee(double /*t_end*/, const std::function<void(const Eigen::VectorXd& y)>&) {}
   /// y within the last step.
   virtual void interpolate(double t, Eigen::VectorXd& y) = 0;
   virtual StepCounts counts() const = 0;

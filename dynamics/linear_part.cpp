@@ -1,17 +1,17 @@
 #include "dynamics/linear_part.hpp"
 
 #include "dynamics/phi.hpp"
-#include "dynamics/small_product.hpp"
 #include "fem/check.hpp"
 #include "fem/dense.hpp"
 #include "fem/lanes.hpp"
 
 #include <fmt/format.h>
-#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <utility>
+#include <vector>
 
 namespace flexboom {
 
@@ -21,7 +21,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int functions = collocation::degree + 4;  // phi_0 .. phi_(degree + 3)
+constexpr int functions = collocation::degree + 3;  // phi_0 .. phi_(degree + 2)
 
 /// Powers of two D such that rows and columns of D^-1 L D are of one size (Parlett, Reinsch 1969).
 VectorXd balance(MatrixXd& L) {
@@ -44,74 +44,130 @@ VectorXd balance(MatrixXd& L) {
   return D;
 }
 
+constexpr Index terms = collocation::points;
+
 /// (zr, zi) = sum over k of b_k times v_k, complex, in halves of m; v_k are the columns z0, M.
 FLEXBOOM_FOR_EACH_PROCESSOR
-void sum_of_products(Index m, Index terms, const double* b, const double* z0, const double* M, double* z) {
+void sum_of_products(Index m, const double* b, const double* z0, const double* M, double* z) {
   double* const zr = z;
   double* const zi = z + m;
-  for (Index k = 0; k <= terms; ++k) {
-    const double* const br = b + 2 * m * k;
-    const double* const bi = br + m;
-    const double* const vr = k == 0 ? z0 : M + 2 * m * (k - 1);
-    const double* const vi = vr + m;
-    if (k == 0) {
 #pragma GCC ivdep
-      for (Index i = 0; i < m; ++i) {
-        zr[i] = br[i] * vr[i] - bi[i] * vi[i];
-        zi[i] = br[i] * vi[i] + bi[i] * vr[i];
-      }
-    } else {
-#pragma GCC ivdep
-      for (Index i = 0; i < m; ++i) {
-        zr[i] += br[i] * vr[i] - bi[i] * vi[i];
-        zi[i] += br[i] * vi[i] + bi[i] * vr[i];
-      }
+  for (Index i = 0; i < m; ++i) {
+    double re = b[i] * z0[i] - b[m + i] * z0[m + i], im = b[i] * z0[m + i] + b[m + i] * z0[i];
+#pragma GCC unroll 8
+    for (Index k = 0; k < terms; ++k) {
+      const double br = b[2 * m * (k + 1) + i], bi = b[2 * m * (k + 1) + m + i];
+      const double vr = M[2 * m * k + i], vi = M[2 * m * k + m + i];
+      re += br * vr - bi * vi;
+      im += br * vi + bi * vr;
     }
+    zr[i] = re;
+    zi[i] = im;
   }
 }
 
-}  // namespace
-
-LinearPart::LinearPart(MatrixXd L, MatrixXd a_hub_by_x, int first_omega, VectorXd base_p)
-    : a_hub(std::move(a_hub_by_x)), base(std::move(base_p)) {
+Spectrum spectrum_of(MatrixXd L) {
   const VectorXd D = balance(L);
   const RealEigenvectors eigen = eigenvectors(L);
-  const MatrixXd inverse = eigen.vectors.inverse();
+  const MatrixXd inverse = flexboom::inverse(eigen.vectors);
   const double growth =
       eigen.vectors.cwiseAbs().rowwise().sum().maxCoeff() * inverse.cwiseAbs().rowwise().sum().maxCoeff();
   if (!(growth < 1e10))
     throw NumericalError(
         fmt::format("exponential: the Jacobian has no full set of eigenvectors ({:.2g}); try bdf", growth));
   const Index m = (eigen.imaginary.array() >= 0).count();
-  lambda.resize(m);
-  from_modes.setZero(L.rows(), 2 * m);
-  to_modes.setZero(2 * m, L.rows());
+  Spectrum s{Eigen::VectorXcd(m), MatrixXd::Zero(L.rows(), 2 * m), MatrixXd::Zero(2 * m, L.rows())};
   for (Index i = 0, k = 0; i < m; ++i) {
-    lambda[i] = {eigen.real[k], eigen.imaginary[k]};
+    s.lambda[i] = {eigen.real[k], eigen.imaginary[k]};
     const bool pair = eigen.imaginary[k] > 0;
     const double twice = pair ? 2 : 1;
-    from_modes.col(i) = twice * D.cwiseProduct(eigen.vectors.col(k));
-    to_modes.row(i) = inverse.row(k).cwiseQuotient(twice * D.transpose());
+    s.from_modes.col(i) = twice * D.cwiseProduct(eigen.vectors.col(k));
+    s.to_modes.row(i) = inverse.row(k).cwiseQuotient(twice * D.transpose());
     ++k;
     if (!pair) continue;
-    from_modes.col(m + i) = -twice * D.cwiseProduct(eigen.vectors.col(k));
-    to_modes.row(m + i) = -inverse.row(k).cwiseQuotient(twice * D.transpose());
+    s.from_modes.col(m + i) = -twice * D.cwiseProduct(eigen.vectors.col(k));
+    s.to_modes.row(m + i) = -inverse.row(k).cwiseQuotient(twice * D.transpose());
     ++k;
   }
-  lambda_re_ = lambda.real();
-  lambda_im_ = lambda.imag();
+  return s;
+}
+
+/// Of L + d e^T, e the unit vector of `column`, from the spectrum of L: in its eigenvectors that is diagonal plus
+/// (W d) (e^T V), and only a block of it is worth another decomposition.
+Spectrum with_column(const Spectrum& s, const VectorXd& d, int column) {
+  // A coupling this small beside the eigenvalues, or beside what motion is slow, is left to the remainder.
+  constexpr double coupled = 1e-5, slow = 100;
+  const Index m = s.lambda.size();
+  const VectorXd w = s.to_modes * d, v = s.from_modes.row(column).transpose();
+  VectorXd strength(m);
+  for (Index i = 0; i < m; ++i)
+    strength[i] =
+        std::sqrt(std::hypot(w[i], w[m + i]) * std::hypot(v[i], v[m + i]) / std::max(std::abs(s.lambda[i]), slow));
+  std::vector<Index> block, rest;
+  for (Index i = 0; i < m; ++i) (strength[i] * strength.maxCoeff() > coupled ? block : rest).push_back(i);
+
+  std::vector<Index> entries = block;  // of z
+  for (const Index i : block)
+    if (s.lambda[i].imag() != 0) entries.push_back(m + i);
+  MatrixXd B = w(entries) * v(entries).transpose();
+  for (Index i = 0, pair = std::ssize(block); i < std::ssize(block); ++i) {
+    const std::complex<double> lambda = s.lambda[block[static_cast<size_t>(i)]];
+    B(i, i) += lambda.real();
+    if (lambda.imag() == 0) continue;
+    B(pair, pair) += lambda.real();
+    B(i, pair) -= lambda.imag();
+    B(pair++, i) += lambda.imag();
+  }
+  const Spectrum inner = spectrum_of(std::move(B));
+
+  const Index n = s.from_modes.rows(), changed = inner.lambda.size(), same = std::ssize(rest), all = changed + same;
+  Spectrum r{Eigen::VectorXcd(all), MatrixXd(n, 2 * all), MatrixXd(2 * all, n)};
+  r.lambda << inner.lambda, s.lambda(rest);
+  MatrixXd from(n, 2 * changed), to(2 * changed, n);
+  small_product(MatrixXd(s.from_modes(Eigen::all, entries)), inner.from_modes, from);
+  small_product(inner.to_modes, MatrixXd(s.to_modes(entries, Eigen::all)), to);
+  for (const Index half : {0, 1}) {
+    r.from_modes.middleCols(half * all, changed) = from.middleCols(half * changed, changed);
+    r.to_modes.middleRows(half * all, changed) = to.middleRows(half * changed, changed);
+    for (Index i = 0; i < same; ++i) {
+      const Index old = half * m + rest[static_cast<size_t>(i)];
+      r.from_modes.col(half * all + changed + i) = s.from_modes.col(old);
+      r.to_modes.row(half * all + changed + i) = s.to_modes.row(old);
+    }
+  }
+  return r;
+}
+
+}  // namespace
+
+LinearPart::LinearPart(MatrixXd L_of_x, int omega_in_x, VectorXd base_p)
+    : LinearPart(spectrum_of(L_of_x), L_of_x, omega_in_x, std::move(base_p)) {}
+
+LinearPart::LinearPart(const LinearPart& other, MatrixXd L_of_x, int column)
+    : LinearPart(with_column(other, L_of_x.col(column) - other.L.col(column), column), L_of_x, other.first_omega,
+                 other.base) {}
+
+LinearPart::LinearPart(Spectrum spectrum, MatrixXd L_of_x, int omega_in_x, VectorXd base_p)
+    : Spectrum(std::move(spectrum)),
+      L(std::move(L_of_x)),
+      of_modes(from_modes.transpose()),
+      base(std::move(base_p)),
+      first_omega(omega_in_x),
+      lambda_re_(lambda.real()),
+      lambda_im_(lambda.imag()) {
   if (first_omega < 0) return;
   omega_modes = from_modes.middleRows<3>(first_omega);
-  a_hub_modes = a_hub * from_modes;
   drift_modes = omega_modes;
+  const Index m = lambda.size();
+  const double fastest = lambda.cwiseAbs().maxCoeff();
   for (Index i = 0; i < m; ++i)
-    if (std::abs(lambda[i]) > 1e-9 * L.norm()) drift_modes.col(i).setZero(), drift_modes.col(m + i).setZero();
+    if (std::abs(lambda[i]) > 1e-9 * fastest) drift_modes.col(i).setZero(), drift_modes.col(m + i).setZero();
 }
 
 void LinearPart::remainder(const Eigen::Ref<const MatrixXd>& F, const Eigen::Ref<const MatrixXd>& Z,
                            Eigen::Ref<MatrixXd> N) const {
   const Index m = lambda.size();
-  small_product(to_modes, F, N);
+  to_z(F, N);
   for (Index c = 0; c < N.cols(); ++c) {
     const double *re = Z.col(c).data(), *im = re + m;
     double *n_re = N.col(c).data(), *n_im = n_re + m;
@@ -154,7 +210,7 @@ const std::vector<GridPoint>& LinearPart::between(Grid& g, double h, int j, int 
 
 void LinearPart::combine(const GridPoint& b, int shift, const Eigen::Ref<const VectorXd>& z0, const MatrixXd& M,
                          Eigen::Ref<VectorXd> z) const {
-  sum_of_products(lambda.size(), M.cols(), b.col(shift).data(), z0.data(), M.data(), z.data());
+  sum_of_products(lambda.size(), b.col(shift).data(), z0.data(), M.data(), z.data());
 }
 
 }  // namespace flexboom

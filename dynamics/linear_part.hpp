@@ -1,6 +1,7 @@
 #pragma once
 
 #include "dynamics/collocation.hpp"
+#include "dynamics/small_product.hpp"
 
 #include <Eigen/Core>
 
@@ -10,7 +11,7 @@
 
 namespace flexboom {
 
-/// c^k phi_k(c h lambda), k = 0 .. degree + 3, of every eigenvalue at one fraction c of a step h, a column for each k:
+/// c^k phi_k(c h lambda), k = 0 .. degree + 2, of every eigenvalue at one fraction c of a step h, a column for each k:
 /// real parts in the upper half, imaginary parts in the lower.
 using GridPoint = Eigen::MatrixXd;
 
@@ -21,15 +22,33 @@ struct Grid {
   std::array<std::vector<std::vector<GridPoint>>, collocation::points> between;
 };
 
-/// L of x' = L x + N(x), x = (p, u), in its eigenvectors: x = from_modes z, z = to_modes x. Of a complex pair one is
-/// kept; z holds real parts, then imaginary parts.
-struct LinearPart {
-  /// Splits L; `a_hub`: acceleration of the hub's origin by x, 3 x nx; `first_omega`: place of the hub's angular
-  /// velocity in x, or -1; `base`: p where L was taken.
+/// Eigenvalues and eigenvectors of a real matrix: x = from_modes z, z = to_modes x. Of a complex pair one is kept; z
+/// holds real parts, then imaginary parts.
+struct Spectrum {
+  Eigen::VectorXcd lambda;
+  Eigen::MatrixXd from_modes, to_modes;
+};
+
+/// L of x' = L x + N(x), x = (p, u), in its eigenvectors.
+struct LinearPart : Spectrum {
+  /// Splits L; `first_omega`: place of the hub's angular velocity in x, or -1; `base`: p where L was taken.
   /// @throws NumericalError when L has no full set of eigenvectors.
-  LinearPart(Eigen::MatrixXd L, Eigen::MatrixXd a_hub, int first_omega, Eigen::VectorXd base);
+  LinearPart(Eigen::MatrixXd L, int first_omega, Eigen::VectorXd base);
+
+  /// Of another L that differs in one column, as by a stop. What the difference hardly couples stays as it is (the
+  /// remainder takes that), so most eigenvectors of many modes are those of `other`.
+  /// @throws NumericalError as above.
+  LinearPart(const LinearPart& other, Eigen::MatrixXd L, int column);
 
   Eigen::Index size() const { return to_modes.rows(); }
+
+  /// Columns of x by those of z and back.
+  void to_x(const Eigen::Ref<const Eigen::MatrixXd>& Z, Eigen::Ref<Eigen::MatrixXd> X) const {
+    small_product(from_modes, Z, X);
+  }
+  void to_z(const Eigen::Ref<const Eigen::MatrixXd>& X, Eigen::Ref<Eigen::MatrixXd> Z) const {
+    small_product(to_modes, X, Z);
+  }
 
   /// N = to_modes F - lambda z, columns at a time.
   void remainder(const Eigen::Ref<const Eigen::MatrixXd>& F, const Eigen::Ref<const Eigen::MatrixXd>& Z,
@@ -42,20 +61,22 @@ struct LinearPart {
   /// The points that part the interval before point j in 2^level.
   const std::vector<GridPoint>& between(Grid&, double h, int j, int level) const;
 
-  /// z at a point (shift 0), or its first or second integral from the start over h or h^2. M: the remainder's
+  /// z at a point (shift 0), or its integral from the start over h (shift 1). M: the remainder's
   /// coefficients of c^m, times h m!.
   void combine(const GridPoint&, int shift, const Eigen::Ref<const Eigen::VectorXd>& z0, const Eigen::MatrixXd& M,
                Eigen::Ref<Eigen::VectorXd> z) const;
 
-  Eigen::VectorXcd lambda;
-  Eigen::MatrixXd from_modes, to_modes;
-  Eigen::MatrixXd a_hub;                     // 3 x nx
-  Eigen::MatrixXd omega_modes, a_hub_modes;  // omega and a_hub by z
-  Eigen::MatrixXd drift_modes;               // omega by the part of z that stays: eigenvalues that are zero
+  Eigen::MatrixXd L;            // nx x nx, in full
+  Eigen::MatrixXd of_modes;     // from_modes, transposed: a coordinate of x by z
+  Eigen::MatrixXd omega_modes;  // omega by z
+  Eigen::MatrixXd drift_modes;  // omega by the part of z that stays: eigenvalues that are zero
   Eigen::VectorXd base;
+  int first_omega;
   double step = 0;  // that served after the last event
 
  private:
+  LinearPart(Spectrum, Eigen::MatrixXd L, int first_omega, Eigen::VectorXd base);
+
   Eigen::VectorXd lambda_re_, lambda_im_;
   std::map<double, Grid> grids_;
 };

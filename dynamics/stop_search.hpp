@@ -33,11 +33,12 @@ class StopSearch {
   /// Vibration of a gap that the points of a step are too far apart for.
   struct Ripple {
     double turn = 0;       // angle that the fastest of it goes through in a step
-    double amplitude = 0;  // all of it, at the start
+    double amplitude = 0;  // all of it
   };
 
-  Ripple ripple(const CollocatedStep&, int at);
-  double first_crossing(const CollocatedStep&, int hinge, double side);
+  /// Of entry `at` of x, from a point of the step on.
+  Ripple ripple(const CollocatedStep&, int at, int point);
+  double first_crossing(const CollocatedStep&, int hinge, double side, double end);
 
   const Layout& layout_;
   std::vector<std::pair<int, double>> roots_;

@@ -45,6 +45,13 @@ struct Balance {
   double angular_momentum_scale = 0;
 };
 
+/// All bodies as one, seen from the hub's origin, hub axes.
+struct Whole {
+  Eigen::Vector3d mass_centre;  // [m]
+  Eigen::Vector3d velocity;     // of the mass centre against the hub's origin, in axes that do not turn [m/s]
+  Eigen::Matrix3d inertia;      // about the mass centre, to first order in elastic coordinates [kg m^2]
+};
+
 /// Places of the parts of the state vector y = [p | u | R | attitude | Rdot | dissipated]:
 /// p = (Delta_1, q_1, Delta_2, q_2, ...) with Delta = Theta - threshold, u = (omega, Delta_dot_1, q_dot_1, ...).
 /// With a fixed hub, omega, R, attitude and Rdot are absent. Delta, not Theta, is the unknown: near the stop it keeps
@@ -126,6 +133,9 @@ class System {
   }
 
   Balance balance(const Eigen::Ref<const Eigen::VectorXd>& y) const;
+
+  /// By p and u alone. Not with a fixed hub.
+  Whole whole(const Eigen::Ref<const Eigen::VectorXd>& y) const;
 
   /// Elastic displacement of the body's marker "tip" in its BRF [m]; zero without that marker.
   Eigen::Vector3d tip_displacement(const State&, int appendage) const;

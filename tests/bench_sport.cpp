@@ -208,6 +208,7 @@ void TenSeconds(benchmark::State& state, const char* method) {
   const OutputTable table = output_table(scene, f, r);
   state.counters["hub.rotation"] = error_of(table, converged(), "hub.rotation");
   state.counters["slp.q"] = error_of(table, converged(), "slp.q");
+  state.counters["largest"] = largest(compare_outputs(table, converged(), {}));
   state.counters["steps"] = static_cast<double>(r.summary.steps);
   state.counters["evaluations"] = static_cast<double>(r.summary.rhs_evaluations);
   state.counters["events"] = static_cast<double>(r.events.size());
@@ -225,6 +226,11 @@ void MoreModes(benchmark::State& state) {
   IntegratorOptions o;
   Trajectory r;
   for (auto _ : state) r = integrate(f.system, f.y0, o);
+  const Scene scene = sport_scene(static_cast<int>(state.range(0)));
+  o.tolerance = 1e-9;
+  const OutputTable reference = output_table(scene, f, integrate(f.system, f.y0, o));
+  state.counters["largest"] = largest(compare_outputs(output_table(scene, f, r), reference, {}));
+  state.counters["coordinates"] = 6 + f.system.layout().p;
   state.counters["steps"] = static_cast<double>(r.summary.steps);
   state.counters["evaluations"] = static_cast<double>(r.summary.rhs_evaluations);
 }

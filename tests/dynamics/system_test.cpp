@@ -207,6 +207,37 @@ TEST(System, MomentaAreConserved) {
   EXPECT_LT(rate_of(c, [&](const VectorXd& y) { return c.system->balance(y).angular_momentum; }).norm(), 1e-8);
 }
 
+// By the point masses: first and second moments, and the velocity of the first.
+TEST(System, IsOneBodyAboutItsMassCentre) {
+  const Case c;
+  const Whole whole = c.system->whole(c.y);
+  const State s = c.system->unpack(c.y);
+  double m = c.system->hub().m;
+  Vector3d first = Vector3d::Zero(), rate = Vector3d::Zero();
+  Matrix3d second = Vector3d(0.5 * (-1.3 + 0.9 + 0.7), 0.5 * (1.3 - 0.9 + 0.7), 0.5 * (1.3 + 0.9 - 0.7)).asDiagonal();
+  second(0, 1) = second(1, 0) = -0.05;
+  for (size_t i = 0; i < c.points.size(); ++i) {
+    const Matrix3d C = c.system->boom_to_hub(static_cast<int>(i), s.angle[i]);
+    const PointBody& points = c.points[i];
+    for (size_t p = 0; p < points.dm.size(); ++p) {
+      const Vector3d u = points.u0[p] + points.S[p] * s.q[i];
+      const Vector3d r = c.system->appendages()[i].hinge.point + C * u;
+      const Vector3d along = C * (s.rate[i] * Vector3d::UnitZ().cross(u) + points.S[p] * s.q_dot[i]);
+      m += points.dm[p];
+      first += points.dm[p] * r;
+      rate += points.dm[p] * (s.omega.cross(r) + along);
+      second += points.dm[p] * r * r.transpose();
+      // Of elastic coordinates to first order: without the square of the deflection.
+      const Vector3d w = C * Vector3d(points.S[p] * s.q[i]);
+      second -= points.dm[p] * w * w.transpose();
+    }
+  }
+  second -= first * first.transpose() / m;
+  EXPECT_LT((whole.mass_centre - first / m).norm(), 1e-14);
+  EXPECT_LT((whole.velocity - rate / m).norm(), 1e-14);
+  EXPECT_LT((whole.inertia - (second.trace() * Matrix3d::Identity() - second)).norm(), 1e-13);
+}
+
 TEST(System, MotionIsTheSameSeenFromAnotherInertialFrame) {
   const Case c;
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.8, Vector3d(1, 2, -1).normalized()));
