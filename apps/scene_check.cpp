@@ -2,7 +2,6 @@
 #include "apps/scene_checks.hpp"
 #include "apps/scene_keys.hpp"
 #include "dynamics/integrator.hpp"
-#include "fem/check.hpp"
 
 #include <fmt/format.h>
 

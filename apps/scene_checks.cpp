@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 
+#include <cctype>
 #include <cmath>
 
 namespace flexboom::scene_checks {

@@ -8,10 +8,12 @@
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 
@@ -73,7 +75,7 @@ class ExponentialStepper final : public Stepper {
   void restart(double t, const VectorXd& y, std::span<const char> contact, std::span<const char> armed) override {
     step_.start = t;
     pending_ = false;
-    if (!angular_momentum_) angular_momentum_ = system_.balance(y).angular_momentum;
+    if (!angular_momentum_) angular_momentum_ = angular_momentum(y);
     contact_.assign(contact.begin(), contact.end());
     armed_.assign(armed.begin(), armed.end());
     step_.linear = &linear_part();
@@ -134,7 +136,7 @@ class ExponentialStepper final : public Stepper {
       if (!system_.fixed_hub()) {
         step_.linear->combine(scratch_, 1, step_.Z.col(0), step_.M, integral_);
         turn(start_.segment<4>(layout_.attitude()), t * step_.linear->omega_modes.lazyProduct(integral_), y);
-        place(com_, com_velocity_, y);
+        place(com_ + t * com_velocity_, com_velocity_, y);
       }
       if (y.allFinite()) look(y);
     }
@@ -172,16 +174,21 @@ class ExponentialStepper final : public Stepper {
     constexpr double pull = 1e-6;
     for (int i = 0; i < layout_.p; ++i)
       if (J.col(i).cwiseAbs().maxCoeff() < pull) J(layout_.p + layout_.base + i, i) -= pull;
-    if (p.isZero())
-      if (const auto [other, hinge] = neighbour(); other != nullptr)
-        return std::make_unique<LinearPart>(*other, std::move(J), layout_.body[hinge]);
+    if (p.isZero(0))
+      if (const auto [other, hinge] = neighbour(); other != nullptr) {
+        try {
+          return std::make_unique<LinearPart>(*other, J, layout_.body[hinge]);
+        } catch (const NumericalError&) {
+          // The block alone has no full set of eigenvectors; all of L may have.
+        }
+      }
     return std::make_unique<LinearPart>(std::move(J), system_.fixed_hub() ? -1 : layout_.p, p);
   }
 
   /// A linear part at rest that differs in one stop, and which.
   std::pair<const LinearPart*, size_t> neighbour() const {
     for (const auto& [contact, part] : linear_parts_) {
-      if (!part || !part->base.isZero()) continue;
+      if (!part || !part->base.isZero(0)) continue;
       const auto [here, there] = std::ranges::mismatch(contact_, contact);
       if (here != contact_.end() && std::equal(here + 1, contact_.end(), there + 1))
         return {part.get(), static_cast<size_t>(here - contact_.begin())};
@@ -223,7 +230,8 @@ class ExponentialStepper final : public Stepper {
     step_.linear->remainder(F_.leftCols(1), step_.Z.leftCols(1), N_.leftCols(1));
   }
 
-  /// The end of the last step is the start of the next.
+  /// The end of the last step is the start of the next; N and the power there are those before momentum was kept, which
+  /// is less than the error that was allowed.
   void advance_start() {
     pending_ = false;
     step_.start = reached_;
@@ -245,7 +253,7 @@ class ExponentialStepper final : public Stepper {
     if (system_.fixed_hub() || system_.field()) return Vector3d::Zero();
     const double rate = 0.01 * scale_.scale[layout_.p], angle = 2 * scale_.scale[layout_.attitude()];
     const Eigen::Matrix3d A = rotation_matrix(y.segment<4>(layout_.attitude())), J = system_.whole(y).inertia;
-    const Vector3d H = A.transpose() * system_.balance(y).angular_momentum;
+    const Vector3d H = A.transpose() * angular_momentum(y);
     const Vector3d lost = A.transpose() * *angular_momentum_ - H;
     // The least (added / rate)^2 + (turned / angle)^2 for which J added + turned x H = lost.
     const Eigen::Matrix3d W = rate * rate * J * J.transpose() +
@@ -254,6 +262,16 @@ class ExponentialStepper final : public Stepper {
     y.segment<3>(layout_.p) += added;
     turn(y.segment<4>(layout_.attitude()), angle * angle * H.cross(pull), y);
     return added;
+  }
+
+  /// About the mass centre, inertial axes: from the hub's origin at rest, for far away and fast it would lose digits.
+  Vector3d angular_momentum(const VectorXd& y) {
+    beside_ = y;
+    if (!system_.fixed_hub()) {
+      beside_.segment<3>(layout_.position()).setZero();
+      beside_.segment<3>(layout_.velocity()).setZero();
+    }
+    return system_.balance(beside_).angular_momentum;
   }
 
   /// Of the start.
@@ -368,8 +386,8 @@ class ExponentialStepper final : public Stepper {
     return on_ladder(h);
   }
 
-  /// What follows p and u: attitude, motion of the mass centre, dissipated energy. It acts back in a field of gravity
-  /// only.
+  /// What follows p and u: attitude, motion of the mass centre, dissipated energy. Within a step it acts back in a
+  /// field of gravity only.
   void follow() {
     const auto to_coefficients = collocation::coefficients();
     power_coefficients_ = to_coefficients.transpose() * power_;
@@ -448,7 +466,7 @@ class ExponentialStepper final : public Stepper {
   double h_ = 0, end_ = 1, last_used_ = 0, reached_ = 0, contraction_ = 0.1;
   bool first_ = true, pending_ = false;
   VectorXd start_, reached_state_;
-  VectorXd y_, y_dot_, previous_;
+  VectorXd y_, y_dot_, previous_, beside_;
   MatrixXd F_, N_, last_N_, M_error_;
   VectorXd error_modes_, z_error_, x_error_, zero_, integral_;
   Points power_ = Points::Zero(), power_coefficients_ = Points::Zero();

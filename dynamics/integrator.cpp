@@ -31,7 +31,7 @@ constexpr std::array<IntegratorMethod, 5> methods = {{
 
 /// Sizes that each state's error is measured against: the largest value so far of the group it belongs to, and never
 /// less than a small part of what the energy at the start could make of it (so that a state that starts at zero has a
-/// size).
+/// size), or a tenth of what the method foresees.
 class Scales {
  public:
   Scales(const System& system, const VectorXd& y0, double tolerance, bool rescale)
@@ -54,7 +54,8 @@ class Scales {
     });
   }
 
-  /// Of a state that may come: a tenth of it counts, and no more than a tenth of what the energy could make.
+  /// Of a state that may come: a tenth of it counts, and where motion comes from the energy no more than a tenth of
+  /// what that could make. Floors rise to it.
   void foresee(const VectorXd& y) {
     for_each_size(y, [&](int i, double size) {
       floor_[i] = std::max(floor_[i], 0.1 * std::min(size, bound_[i]));
@@ -89,7 +90,8 @@ class Scales {
         held = std::max(held, body.Ke(k, k) * q * q + body.Me(k, k) * v * v);
       }
       for (int k = 0; k < n; ++k) {
-        each(at + 1 + k, std::sqrt(held / body.Ke(k, k)));
+        const double q = std::abs(y[at + 1 + k]);
+        each(at + 1 + k, body.Ke(k, k) > 0 ? std::max(q, std::sqrt(held / body.Ke(k, k))) : q);
         each(rate + 1 + k, std::sqrt(held / body.Me(k, k)));
       }
     }
@@ -113,7 +115,9 @@ class Scales {
   void floors(const VectorXd& y0) {
     constexpr double part = 1e-4;
     const Layout& l = system_.layout();
-    const Balance b = system_.balance(y0);
+    VectorXd beside = y0;  // on its way with the hub: that energy shakes nothing
+    if (!system_.fixed_hub()) beside.segment<3>(l.velocity()).setZero();
+    const Balance b = system_.balance(beside);
     const double energy = std::max(b.kinetic + b.elastic, 1e-30);
     floor_ = VectorXd::Constant(y0.size(), part);
     const double spin = system_.fixed_hub() ? 0 : y0.segment<3>(l.u_begin()).norm();
@@ -127,13 +131,13 @@ class Scales {
       floor_[at] = part * std::max(std::abs(y0[at]), std::sqrt(2 * energy / k));
       floor_[rate] = part * std::sqrt(2 * energy / J);
       for (int m = 0; m < a.body.n(); ++m) {
-        floor_[at + 1 + m] = part * std::sqrt(2 * energy / a.body.Ke(m, m));
+        floor_[at + 1 + m] = part * std::sqrt(2 * energy / std::max(a.body.Ke(m, m), 1e-6 * energy));
         floor_[rate + 1 + m] = part * std::sqrt(2 * energy / a.body.Me(m, m));
       }
     }
     floor_[l.dissipated()] = energy;
     if (!system_.fixed_hub()) {
-      const double J = system_.hub().J0.trace() / 3, v = std::sqrt(2 * energy / system_.hub().m);
+      const double J = system_.whole(y0).inertia.trace() / 3, v = std::sqrt(2 * energy / system_.hub().m);
       floor_.segment<3>(l.u_begin()).setConstant(part * std::sqrt(2 * energy / J));
       floor_.segment<3>(l.velocity()).setConstant(part * v);
       floor_.segment<3>(l.position()).setConstant(part * v * std::max(longest, 1e-3));

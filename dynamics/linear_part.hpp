@@ -23,7 +23,7 @@ struct Grid {
 };
 
 /// Eigenvalues and eigenvectors of a real matrix: x = from_modes z, z = to_modes x. Of a complex pair one is kept; z
-/// holds real parts, then imaginary parts.
+/// holds real parts, then imaginary parts. m eigenvalues: from_modes is nx x 2 m, to_modes 2 m x nx.
 struct Spectrum {
   Eigen::VectorXcd lambda;
   Eigen::MatrixXd from_modes, to_modes;
@@ -37,7 +37,7 @@ struct LinearPart : Spectrum {
 
   /// Of another L that differs in one column, as by a stop. What the difference hardly couples stays as it is (the
   /// remainder takes that), so most eigenvectors of many modes are those of `other`.
-  /// @throws NumericalError as above.
+  /// @throws NumericalError when the block that is coupled has no full set of eigenvectors.
   LinearPart(const LinearPart& other, Eigen::MatrixXd L, int column);
 
   Eigen::Index size() const { return to_modes.rows(); }
@@ -72,7 +72,7 @@ struct LinearPart : Spectrum {
   Eigen::MatrixXd drift_modes;  // omega by the part of z that stays: eigenvalues that are zero
   Eigen::VectorXd base;
   int first_omega;
-  double step = 0;  // that served after the last event
+  double step = 0;  // to try first after an event: that of the last time, or a longer one where its error was small
 
  private:
   LinearPart(Spectrum, Eigen::MatrixXd L, int first_omega, Eigen::VectorXd base);

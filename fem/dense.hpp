@@ -28,10 +28,10 @@ struct RealEigenvectors {
   Eigen::MatrixXd vectors;
 };
 
-/// By LAPACK. @throws NumericalError when it does not converge.
+/// By LAPACK. @throws InputError for a matrix that is not square, NumericalError when it does not converge.
 RealEigenvectors eigenvectors(Eigen::MatrixXd A);
 
-/// By LAPACK. @throws NumericalError when a pivot is zero.
+/// By LAPACK. @throws InputError for a matrix that is not square, NumericalError when a pivot is zero.
 Eigen::MatrixXd inverse(Eigen::MatrixXd A);
 
 }  // namespace flexboom

@@ -162,6 +162,13 @@ TEST(LinearPart, FollowsFromAnotherThatDiffersInAColumn) {
   const VectorXd F = part.to_modes * (L * x);
   EXPECT_LT(N.norm(), 1e-4 * F.norm());
   EXPECT_GT(N.norm(), 0);
+  // And back again; and one that couples nothing.
+  const LinearPart back(part, before, 0);
+  EXPECT_LT((back.from_modes * back.to_modes - I).norm(), 1e-10);
+  for (Eigen::Index i = 0; i < other.lambda.size(); ++i)
+    EXPECT_LT((back.lambda.array() - other.lambda[i]).cwiseAbs().minCoeff(), 1e-8 * std::abs(other.lambda[i])) << i;
+  const LinearPart same(other, chain(count, 1e-9), 0);
+  EXPECT_EQ(same.lambda, other.lambda);
 }
 
 TEST(LinearPart, WithoutAFullSetOfEigenvectorsIsRefused) {
@@ -264,18 +271,37 @@ TEST(Exponential, MoreModesDoNotShrinkTheStep) {
 TEST(Exponential, KeepsMomentaAtAnyTolerance) {
   const System system = sport_boom(4);
   State s = system.at_rest({pi / 2 - 1.2});
-  for (const Vector3d& omega : {Vector3d(0, 0, 0), Vector3d(0.3, -0.2, 0.5)}) {
-    s.omega = omega;
-    s.velocity = Vector3d(0.1, 0.2, -0.3);
-    const Trajectory r = integrate(system, system.pack(s), exponential(1e-2, 2));
-    EXPECT_GT(r.events.size(), 4U);
-    // Where a step ends: nothing but the square of the deflection in the inertia is left out of the correction.
-    const Balance &first = r.balance.front(), &last = r.balance.back();
-    const double scale = system.hub().J0.norm() * (0.1 + omega.norm());
-    EXPECT_LT((last.angular_momentum - first.angular_momentum).norm(), 1e-7 * scale);
-    EXPECT_LT((last.momentum - first.momentum).norm(), 1e-14 * first.momentum_scale);
-    EXPECT_LT(r.summary.energy_balance, 1e-2);
+  for (const double tolerance : {1e-2, 1e-4, 1e-7})
+    for (const Vector3d& omega : {Vector3d(0, 0, 0), Vector3d(0.3, -0.2, 0.5)}) {
+      s.omega = omega;
+      s.velocity = Vector3d(0.1, 0.2, -0.3);
+      const Trajectory r = integrate(system, system.pack(s), exponential(tolerance, 2));
+      EXPECT_GT(r.events.size(), 4U);
+      // Where a step ends: nothing but the square of the deflection in the inertia is left out of the correction.
+      const Balance &first = r.balance.front(), &last = r.balance.back();
+      const double scale = system.hub().J0.norm() * (0.1 + omega.norm());
+      EXPECT_LT((last.angular_momentum - first.angular_momentum).norm(), 1e-7 * scale);
+      EXPECT_LT((last.momentum - first.momentum).norm(), 1e-14 * first.momentum_scale);
+      EXPECT_LT(r.summary.energy_balance, tolerance);
+    }
+}
+
+// Shape and rates do not know how far the hub is, or how fast.
+TEST(Exponential, PlaceDoesNotActBack) {
+  const System system = sport_boom(4);
+  State s = system.at_rest({pi / 2 - pi / 60});
+  const Trajectory here = integrate(system, system.pack(s), exponential(1e-9, 2));
+  s.position = Vector3d(1e7, -2e7, 3e6);
+  s.velocity = Vector3d(7e3, 100, -3e3);
+  const Trajectory away = integrate(system, system.pack(s), exponential(1e-9, 2));
+  ASSERT_EQ(away.time.size(), here.time.size());
+  const Layout& l = system.layout();
+  VectorXd size = VectorXd::Zero(l.p + l.u), error = size;
+  for (size_t i = 0; i < here.time.size(); ++i) {
+    size = size.cwiseMax(here.y[i].head(l.p + l.u).cwiseAbs());
+    error = error.cwiseMax((away.y[i] - here.y[i]).head(l.p + l.u).cwiseAbs());
   }
+  for (Eigen::Index i = 0; i < size.size(); ++i) EXPECT_LE(error[i], 1e-11 * size[i]) << i;
 }
 
 // Interpolated outputs are as good as steps that end there.
