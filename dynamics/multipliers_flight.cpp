@@ -266,7 +266,9 @@ class MultipliersFlight final : public DaeProblem {
         return here;
       };
       const double root = crossing_between(at, before_[i], to, 4e-16 * t_);
-      if (root >= first) continue;
+      // At round-off of the gap it may be no crossing to those who look at the rate: then the step ends where it ended,
+      // for the next one starts there.
+      if (root >= first || !(at(root).slope < 0)) continue;
       std::fill(crossed_.begin(), crossed_.end(), 0);
       crossed_[i] = memory_.closed[stops_[i]] ? -1 : 1;
       first = root;
