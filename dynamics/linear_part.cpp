@@ -104,7 +104,8 @@ Spectrum with_column(const Spectrum& s, const VectorXd& d, int column) {
     strength[i] =
         std::sqrt(std::hypot(w[i], w[m + i]) * std::hypot(v[i], v[m + i]) / std::max(std::abs(s.lambda[i]), slow));
   std::vector<Index> block, rest;
-  for (Index i = 0; i < m; ++i) (strength[i] * strength.maxCoeff() > coupled ? block : rest).push_back(i);
+  const double strongest = strength.maxCoeff();
+  for (Index i = 0; i < m; ++i) (strength[i] * strongest > coupled ? block : rest).push_back(i);
   if (block.empty()) return s;
 
   std::vector<Index> entries = block;  // of z
