@@ -1,108 +1,63 @@
+#include "dynamics/hub_momenta.hpp"
+#include "dynamics/inner_loop.hpp"
 #include "dynamics/rotation.hpp"
-#include "dynamics/system.hpp"
-#include "reduction/root_loads.hpp"
+#include "dynamics/system_impl.hpp"
 
 #include <algorithm>
 
 namespace flexboom {
 
 using Eigen::Matrix3d;
-using Eigen::Ref;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
+using spatial::eigen;
 
 namespace {
 
-double hinge_energy(const HingeMechanism& m, double angle) {
-  const double stretch = angle - m.rest, depth = std::max(0.0, angle - m.threshold);
+double hinge_energy(const HingeMechanism& m, double gap) {
+  const double stretch = gap + m.threshold - m.rest, depth = std::max(0.0, gap);
   return 0.5 * m.stiffness * stretch * stretch + 0.5 * m.stop_stiffness * depth * depth;
 }
 
-/// Sums over the bodies, about the inertial origin.
-struct Totals {
-  Balance balance;
-  double m = 0;
-  Vector3d first_moment = Vector3d::Zero();
+FLEXBOOM_INNER_LOOP
+equations::Together together(const equations::Model& model, const double* p, const double* u, Workspace& w) {
+  return equations::together(model, p, u, w.scratch);
+}
 
-  /// v, w in the axes of the body, A: these -> inertial, R: its BRF origin.
-  void add(const ReducedBody& b, const Vector3d& v, const Vector3d& w, const Ref<const VectorXd>& q,
-           const Ref<const VectorXd>& q_dot, const Matrix3d& A, const Vector3d& R) {
-    const BodyMomenta of_body = momenta(b, v, w, q, q_dot);
-    const Vector3d P = A * of_body.linear;
-    const Vector3d H = A * of_body.angular;
-    balance.kinetic += of_body.kinetic;
-    balance.momentum += P;
-    balance.momentum_scale += P.norm();
-    balance.angular_momentum += H + R.cross(P);
-    balance.angular_momentum_scale += H.norm();
-    m += b.m;
-    first_moment += b.m * R + A * b.mc0;
-    if (b.n() > 0) first_moment += A * Vector3d(b.Ct.lazyProduct(q));
-  }
-};
+/// What |r|^2 I - r r^T is for all mass at r.
+Matrix3d at(const Vector3d& r, double m) { return m * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose()); }
 
 }  // namespace
 
-Balance System::balance(const Eigen::Ref<const VectorXd>& y) const {
+Balance System::balance(const Eigen::Ref<const VectorXd>& y, Workspace& w) const {
   const Layout& l = layout();
-  Matrix3d A = Matrix3d::Identity();
-  Vector3d R = Vector3d::Zero(), V = Vector3d::Zero(), omega = Vector3d::Zero();
-  Totals totals;
-  if (!fixed_hub()) {
-    A = rotation_matrix(y.segment<4>(l.attitude()));
-    R = y.segment<3>(l.position());
-    V = y.segment<3>(l.velocity());
-    omega = y.segment<3>(l.u_begin());
-    const auto none = y.head(0);
-    totals.add(hub(), A.transpose() * V, omega, none, none, A, R);
+  const equations::Together all = together(impl_->model, y.data(), y.data() + l.u_begin(), w);
+  Balance r;
+  r.kinetic = all.kinetic;
+  r.elastic = all.strain;
+  for (size_t i = 0; i < l.body.size(); ++i) r.elastic += hinge_energy(appendages()[i].hinge.mechanism, y[l.body[i]]);
+  r.momentum_scale = all.momentum_scale;
+  r.angular_momentum_scale = all.angular_momentum_scale;
+  const Vector3d P = eigen(all.momentum), H = eigen(all.angular_momentum), moment = eigen(all.first_moment);
+  const Vector3d about_mass_centre = H - moment.cross(P) / all.m;
+  if (fixed_hub()) {
+    r.momentum = P;
+    r.angular_momentum = about_mass_centre;
+    return r;
   }
-  for (size_t i = 0; i < appendages().size(); ++i) {
-    const Appendage& a = appendages()[i];
-    const int at = l.body[i], rate = l.u_begin() + l.base + at, n = a.body.n();
-    const double angle = y[at] + a.hinge.mechanism.threshold;
-    const auto q = y.segment(at + 1, n), q_dot = y.segment(rate + 1, n);
-    const Matrix3d C = boom_to_hub(static_cast<int>(i), angle);
-    const Vector3d v = C.transpose() * (A.transpose() * V + omega.cross(a.hinge.point));
-    const Vector3d w = C.transpose() * omega + y[rate] * Vector3d::UnitZ();
-    totals.add(a.body, v, w, q, q_dot, A * C, R + A * a.hinge.point);
-    totals.balance.elastic += hinge_energy(a.hinge.mechanism, angle);
-    if (n > 0) totals.balance.elastic += 0.5 * q.dot(a.body.Ke.lazyProduct(q));
-  }
-  totals.balance.angular_momentum -= (totals.first_moment / totals.m).cross(totals.balance.momentum);
-  return totals.balance;
+  const Matrix3d A = rotation_matrix(y.segment<4>(l.attitude()));
+  const Vector3d V = y.segment<3>(l.velocity());
+  r.momentum = all.m * V + A * P;
+  r.momentum_scale += all.m * V.norm();
+  r.kinetic += V.dot(A * P) + 0.5 * all.m * V.squaredNorm();
+  r.angular_momentum = A * about_mass_centre;
+  return r;
 }
 
-Whole System::whole(const Eigen::Ref<const VectorXd>& y) const {
-  const Layout& l = layout();
-  const Vector3d omega = y.segment<3>(l.u_begin());
-  // What |r + b|^2 I - (r + b) (r + b)^T has beyond those of r and of b.
-  const auto crossed = [](const Vector3d& r, const Vector3d& b) -> Matrix3d {
-    return 2 * r.dot(b) * Matrix3d::Identity() - r * b.transpose() - b * r.transpose();
-  };
-  double m = hub().m;
-  Vector3d moment = hub().mc0, rate = Vector3d::Zero();
-  Matrix3d J = hub().J0;
-  for (size_t i = 0; i < appendages().size(); ++i) {
-    const Appendage& a = appendages()[i];
-    const ReducedBody& b = a.body;
-    const int at = l.body[i], turn = l.u_begin() + l.base + at;
-    const Matrix3d C = boom_to_hub(static_cast<int>(i), y[at] + a.hinge.mechanism.threshold);
-    Vector3d mc = b.mc0, mc_rate = Vector3d::Zero();
-    Matrix3d own = b.J0;
-    for (int k = 0; k < b.n(); ++k) {
-      mc += b.Ct.col(k) * y[at + 1 + k];
-      mc_rate += b.Ct.col(k) * y[turn + 1 + k];
-      own += b.J1[static_cast<size_t>(k)] * y[at + 1 + k];
-    }
-    const Vector3d& d = a.hinge.point;
-    const Vector3d out = C * mc;
-    m += b.m;
-    moment += b.m * d + out;
-    rate += C * (y[turn] * Vector3d::UnitZ().cross(mc) + mc_rate);
-    J += C * own * C.transpose() + crossed(d, out) + 0.5 * b.m * crossed(d, d);
-  }
-  const Vector3d c = moment / m;
-  return {c, omega.cross(c) + rate / m, J - 0.5 * m * crossed(c, c)};
+Whole System::whole(const Eigen::Ref<const VectorXd>& y, Workspace& w) const {
+  const equations::Together all = together(impl_->model, y.data(), y.data() + layout().u_begin(), w);
+  const Vector3d c = eigen(all.first_moment) / all.m, P = eigen(all.momentum);
+  return {c, P / all.m, eigen(all.inertia) - at(c, all.m), eigen(all.angular_momentum) - c.cross(P)};
 }
 
 }  // namespace flexboom

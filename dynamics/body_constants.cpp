@@ -79,6 +79,7 @@ void pack_invariants(const ReducedBody& b, equations::Body& r) {
   r.Cr1 = non_zeros(r.n, r.n, 3, [&](size_t k, int l, int c) { return b.Cr1[k](c, l); });
   r.Ke = row_major(b.Ke);
   r.De = row_major(b.De);
+  r.Me = row_major(b.Me);
   r.diagonal = is_diagonal(b.Ke) && is_diagonal(b.De) && is_diagonal(b.Me);
   const MatrixXd Me_inverse = r.n ? MatrixXd(b.Me.llt().solve(MatrixXd::Identity(r.n, r.n))) : MatrixXd(0, 0);
   r.Me_inverse = row_major(0.5 * (Me_inverse + Me_inverse.transpose()));

@@ -31,7 +31,7 @@ struct BodyOf {
   Sym3<C> J0;
   std::vector<Vec3<C>> Ct, Cr0;        // n
   std::vector<TermOf<C>> Cr1, J1, J2;  // non-zeros
-  std::vector<C> Ke, De;               // n x n
+  std::vector<C> Ke, De, Me;           // n x n
   std::vector<C> Me_inverse;           // n x n
   bool diagonal = false;               // Ke, De and Me are diagonal: modes, no constraint shapes
   std::vector<Vec3<C>> Gt;             // Me^-1 Ct^T, n

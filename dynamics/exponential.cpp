@@ -75,7 +75,8 @@ class ExponentialStepper final : public Stepper {
   void restart(double t, const VectorXd& y, std::span<const char> contact, std::span<const char> armed) override {
     step_.start = t;
     pending_ = false;
-    if (!angular_momentum_) angular_momentum_ = angular_momentum(y);
+    if (!angular_momentum_ && !system_.fixed_hub())
+      angular_momentum_ = rotation_matrix(y.segment<4>(layout_.attitude())) * system_.whole(y, *work_).angular_momentum;
     contact_.assign(contact.begin(), contact.end());
     armed_.assign(armed.begin(), armed.end());
     step_.linear = &linear_part();
@@ -252,8 +253,9 @@ class ExponentialStepper final : public Stepper {
   Vector3d keep_momentum(VectorXd& y) {
     if (system_.fixed_hub() || system_.field()) return Vector3d::Zero();
     const double rate = 0.01 * scale_.scale[layout_.p], angle = 2 * scale_.scale[layout_.attitude()];
-    const Eigen::Matrix3d A = rotation_matrix(y.segment<4>(layout_.attitude())), J = system_.whole(y).inertia;
-    const Vector3d H = A.transpose() * angular_momentum(y);
+    const Whole whole = system_.whole(y, *work_);
+    const Eigen::Matrix3d A = rotation_matrix(y.segment<4>(layout_.attitude())), &J = whole.inertia;
+    const Vector3d& H = whole.angular_momentum;
     const Vector3d lost = A.transpose() * *angular_momentum_ - H;
     // The least (added / rate)^2 + (turned / angle)^2 for which J added + turned x H = lost.
     const Eigen::Matrix3d W = rate * rate * J * J.transpose() +
@@ -264,20 +266,10 @@ class ExponentialStepper final : public Stepper {
     return added;
   }
 
-  /// About the mass centre, inertial axes: from the hub's origin at rest, for far away and fast it would lose digits.
-  Vector3d angular_momentum(const VectorXd& y) {
-    beside_ = y;
-    if (!system_.fixed_hub()) {
-      beside_.segment<3>(layout_.position()).setZero();
-      beside_.segment<3>(layout_.velocity()).setZero();
-    }
-    return system_.balance(beside_).angular_momentum;
-  }
-
   /// Of the start.
   void take_mass_centre() {
     if (system_.fixed_hub()) return;
-    const Whole whole = system_.whole(start_);
+    const Whole whole = system_.whole(start_, *work_);
     const Eigen::Matrix3d A = rotation_matrix(start_.segment<4>(layout_.attitude()));
     com_ = start_.segment<3>(layout_.position()) + A * whole.mass_centre;
     com_velocity_ = start_.segment<3>(layout_.velocity()) + A * whole.velocity;
@@ -300,7 +292,7 @@ class ExponentialStepper final : public Stepper {
     if (!system_.field()) return;
     const LocalGravity g = system_.field()->at(t, y_.segment<3>(layout_.position()));
     const Eigen::Matrix3d A = rotation_matrix(y_.segment<4>(layout_.attitude()));
-    gravity_.col(j) = g.at(A * system_.whole(y_).mass_centre).acceleration;
+    gravity_.col(j) = g.at(A * system_.whole(y_, *work_).mass_centre).acceleration;
   }
 
   /// Sweeps until the points stand still; returns the error in units of the one allowed, infinite when they do not.
@@ -445,7 +437,7 @@ class ExponentialStepper final : public Stepper {
           com_velocity_ + step_.length * (falling_ * collocation::integrals(c)), y);
   }
   void place(const Vector3d& com, const Vector3d& com_velocity, VectorXd& y) const {
-    const Whole whole = system_.whole(y);
+    const Whole whole = system_.whole(y, *work_);
     const Eigen::Matrix3d A = rotation_matrix(y.segment<4>(layout_.attitude()));
     y.segment<3>(layout_.velocity()) = com_velocity - A * whole.velocity;
     y.segment<3>(layout_.position()) = com - A * whole.mass_centre;
@@ -466,7 +458,7 @@ class ExponentialStepper final : public Stepper {
   double h_ = 0, end_ = 1, last_used_ = 0, reached_ = 0, contraction_ = 0.1;
   bool first_ = true, pending_ = false;
   VectorXd start_, reached_state_;
-  VectorXd y_, y_dot_, previous_, beside_;
+  VectorXd y_, y_dot_, previous_;
   MatrixXd F_, N_, last_N_, M_error_;
   VectorXd error_modes_, z_error_, x_error_, zero_, integral_;
   Points power_ = Points::Zero(), power_coefficients_ = Points::Zero();

@@ -88,19 +88,22 @@ double sum(const C& a, int count) {
   return s;
 }
 
+template <class C>
+Vec3<double> sum(const Vec3<C>& a, int count) {
+  return {sum(a.x, count), sum(a.y, count), sum(a.z, count)};
+}
+template <class C>
+Sym3<double> sum(const Sym3<C>& a, int count) {
+  return {sum(a.xx, count), sum(a.yy, count), sum(a.zz, count), sum(a.xy, count), sum(a.yz, count), sum(a.zx, count)};
+}
+
 /// `to` += what all the bodies add.
 template <class C>
 void add(const HubSystem<C>& part, int count, HubSystem<double>& to) {
-  const auto vector = [count](const Vec3<C>& a) {
-    return Vec3<double>{sum(a.x, count), sum(a.y, count), sum(a.z, count)};
-  };
-  const auto symmetric = [count](const Sym3<C>& a) {
-    return Sym3<double>{sum(a.xx, count), sum(a.yy, count), sum(a.zz, count),
-                        sum(a.xy, count), sum(a.yz, count), sum(a.zx, count)};
-  };
-  to += {symmetric(part.tt), symmetric(part.ww),
-         Mat3<double>{{vector(part.tw.row[0]), vector(part.tw.row[1]), vector(part.tw.row[2])}}, vector(part.ft),
-         vector(part.fw)};
+  const auto& rows = part.tw.row;
+  to += {sum(part.tt, count), sum(part.ww, count),
+         Mat3<double>{{sum(rows[0], count), sum(rows[1], count), sum(rows[2], count)}}, sum(part.ft, count),
+         sum(part.fw, count)};
 }
 
 /// The hub alone, before any body is added: mass matrix, and force at angular velocity w.

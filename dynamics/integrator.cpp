@@ -117,7 +117,8 @@ class Scales {
     const Layout& l = system_.layout();
     VectorXd beside = y0;  // on its way with the hub: that energy shakes nothing
     if (!system_.fixed_hub()) beside.segment<3>(l.velocity()).setZero();
-    const Balance b = system_.balance(beside);
+    const WorkspaceHandle work = system_.workspace();
+    const Balance b = system_.balance(beside, *work);
     const double energy = std::max(b.kinetic + b.elastic, 1e-30);
     floor_ = VectorXd::Constant(y0.size(), part);
     const double spin = system_.fixed_hub() ? 0 : y0.segment<3>(l.u_begin()).norm();
@@ -137,7 +138,7 @@ class Scales {
     }
     floor_[l.dissipated()] = energy;
     if (!system_.fixed_hub()) {
-      const double J = system_.whole(y0).inertia.trace() / 3, v = std::sqrt(2 * energy / system_.hub().m);
+      const double J = system_.whole(y0, *work).inertia.trace() / 3, v = std::sqrt(2 * energy / system_.hub().m);
       floor_.segment<3>(l.u_begin()).setConstant(part * std::sqrt(2 * energy / J));
       floor_.segment<3>(l.velocity()).setConstant(part * v);
       floor_.segment<3>(l.position()).setConstant(part * v * std::max(longest, 1e-3));
@@ -256,7 +257,7 @@ class Flight {
       drift = std::max(drift, std::abs(attitude.norm() - 1));
       attitude.normalize();
     }
-    result_.balance.push_back(system_.balance(result_.y.back()));
+    result_.balance.push_back(system_.balance(result_.y.back(), *work_));
   }
 
   /// Applies crossings and settling. True when something changed and the method must start again.

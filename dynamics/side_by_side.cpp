@@ -74,6 +74,7 @@ equations::BodyOf<Quad> side_by_side(const Members& b) {
   r.J2 = terms(b, &Body::J2);
   r.Ke = numbers(b, &Body::Ke);
   r.De = numbers(b, &Body::De);
+  r.Me = numbers(b, &Body::Me);
   r.Me_inverse = numbers(b, &Body::Me_inverse);
   r.diagonal = std::ranges::all_of(b, [](const Body* x) { return x->diagonal; });
   r.Gt = vectors(b, &Body::Gt);

@@ -41,15 +41,16 @@ struct Balance {
   double elastic = 0;                                          // booms, hinge springs and stops
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero();          // [kg m/s]
   Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();  // about the system's mass centre [N m s]
-  double momentum_scale = 0;  // sum of the bodies' |momentum|: what a drift is relative to
+  double momentum_scale = 0;  // sum of the bodies' |momentum|, and of all with the hub: what a drift is relative to
   double angular_momentum_scale = 0;
 };
 
 /// All bodies as one, seen from the hub's origin, hub axes.
 struct Whole {
-  Eigen::Vector3d mass_centre;  // [m]
-  Eigen::Vector3d velocity;     // of the mass centre against the hub's origin, in axes that do not turn [m/s]
-  Eigen::Matrix3d inertia;      // about the mass centre, to first order in elastic coordinates [kg m^2]
+  Eigen::Vector3d mass_centre;       // [m]
+  Eigen::Vector3d velocity;          // of the mass centre against the hub's origin, in axes that do not turn [m/s]
+  Eigen::Matrix3d inertia;           // about the mass centre [kg m^2]
+  Eigen::Vector3d angular_momentum;  // about the mass centre [N m s]
 };
 
 /// Places of the parts of the state vector y = [p | u | R | attitude | Rdot | dissipated]:
@@ -132,10 +133,10 @@ class System {
     return y[l.u_begin() + l.base + l.body[static_cast<size_t>(appendage)]];
   }
 
-  Balance balance(const Eigen::Ref<const Eigen::VectorXd>& y) const;
+  Balance balance(const Eigen::Ref<const Eigen::VectorXd>& y, Workspace&) const;
 
-  /// By p and u alone. Not with a fixed hub.
-  Whole whole(const Eigen::Ref<const Eigen::VectorXd>& y) const;
+  /// By p and u alone.
+  Whole whole(const Eigen::Ref<const Eigen::VectorXd>& y, Workspace&) const;
 
   /// Elastic displacement of the body's marker "tip" in its BRF [m]; zero without that marker.
   Eigen::Vector3d tip_displacement(const State&, int appendage) const;

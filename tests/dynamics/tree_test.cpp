@@ -79,7 +79,7 @@ TEST(Tree, OfAHubWithHingedBoomsIsTheSystem) {
     const VectorXd found = derivative(tree, 0, of_tree, contact_of_tree).head(l.size - 1);
     // Round-off of two orders of summation with a condition number near 1e3.
     EXPECT_LT((found - y_dot.head(l.size - 1)).norm(), 1e-12 * y_dot.norm()) << fixed_hub;
-    const Balance expected = system.balance(y);
+    const Balance expected = system.balance(y, *system.workspace());
     const TreeBalance balance = tree.balance(0, of_tree);
     EXPECT_NEAR(balance.kinetic / expected.kinetic, 1, 1e-13);
     EXPECT_NEAR(balance.elastic / expected.elastic, 1, 1e-13);
