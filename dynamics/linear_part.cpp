@@ -1,11 +1,8 @@
 #include "dynamics/linear_part.hpp"
 
 #include "dynamics/phi.hpp"
-#include "fem/check.hpp"
-#include "fem/dense.hpp"
 #include "fem/lanes.hpp"
 
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -22,27 +19,6 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int functions = collocation::degree + 3;  // phi_0 .. phi_(degree + 2)
-
-/// Powers of two D such that rows and columns of D^-1 L D are of one size (Parlett, Reinsch 1969).
-VectorXd balance(MatrixXd& L) {
-  VectorXd D = VectorXd::Ones(L.rows());
-  for (int round = 0; round < 40; ++round) {
-    bool changed = false;
-    for (Index i = 0; i < L.rows(); ++i) {
-      const double d = std::abs(L(i, i));
-      const double row = L.row(i).cwiseAbs().sum() - d, column = L.col(i).cwiseAbs().sum() - d;
-      if (row == 0 || column == 0) continue;
-      const double f = std::exp2(std::round(0.5 * std::log2(row / column)));
-      if (f == 1) continue;
-      L.row(i) /= f;
-      L.col(i) *= f;
-      D[i] *= f;
-      changed = true;
-    }
-    if (!changed) break;
-  }
-  return D;
-}
 
 constexpr Index terms = collocation::points;
 
@@ -64,80 +40,6 @@ void sum_of_products(Index m, const double* b, const double* z0, const double* M
     zr[i] = re;
     zi[i] = im;
   }
-}
-
-Spectrum spectrum_of(MatrixXd L) {
-  const VectorXd D = balance(L);
-  const RealEigenvectors eigen = eigenvectors(L);
-  const MatrixXd inverse = flexboom::inverse(eigen.vectors);
-  const double growth =
-      eigen.vectors.cwiseAbs().rowwise().sum().maxCoeff() * inverse.cwiseAbs().rowwise().sum().maxCoeff();
-  if (!(growth < 1e10))
-    throw NumericalError(
-        fmt::format("exponential: the Jacobian has no full set of eigenvectors ({:.2g}); try bdf", growth));
-  const Index m = (eigen.imaginary.array() >= 0).count();
-  Spectrum s{Eigen::VectorXcd(m), MatrixXd::Zero(L.rows(), 2 * m), MatrixXd::Zero(2 * m, L.rows())};
-  for (Index i = 0, k = 0; i < m; ++i) {
-    s.lambda[i] = {eigen.real[k], eigen.imaginary[k]};
-    const bool pair = eigen.imaginary[k] > 0;
-    const double twice = pair ? 2 : 1;
-    s.from_modes.col(i) = twice * D.cwiseProduct(eigen.vectors.col(k));
-    s.to_modes.row(i) = inverse.row(k).cwiseQuotient(twice * D.transpose());
-    ++k;
-    if (!pair) continue;
-    s.from_modes.col(m + i) = -twice * D.cwiseProduct(eigen.vectors.col(k));
-    s.to_modes.row(m + i) = -inverse.row(k).cwiseQuotient(twice * D.transpose());
-    ++k;
-  }
-  return s;
-}
-
-/// Of L + d e^T, e the unit vector of `column`, from the spectrum of L: in its eigenvectors that is diagonal plus
-/// (W d) (e^T V), and only a block of it is worth another decomposition.
-Spectrum with_column(const Spectrum& s, const VectorXd& d, int column) {
-  // A coupling this small beside the eigenvalues, or beside what motion is slow, is left to the remainder.
-  constexpr double coupled = 1e-5, slow = 100;
-  const Index m = s.lambda.size();
-  const VectorXd w = s.to_modes * d, v = s.from_modes.row(column).transpose();
-  VectorXd strength(m);
-  for (Index i = 0; i < m; ++i)
-    strength[i] =
-        std::sqrt(std::hypot(w[i], w[m + i]) * std::hypot(v[i], v[m + i]) / std::max(std::abs(s.lambda[i]), slow));
-  std::vector<Index> block, rest;
-  const double strongest = strength.maxCoeff();
-  for (Index i = 0; i < m; ++i) (strength[i] * strongest > coupled ? block : rest).push_back(i);
-  if (block.empty()) return s;
-
-  std::vector<Index> entries = block;  // of z
-  for (const Index i : block)
-    if (s.lambda[i].imag() != 0) entries.push_back(m + i);
-  MatrixXd B = w(entries) * v(entries).transpose();
-  for (Index i = 0, pair = std::ssize(block); i < std::ssize(block); ++i) {
-    const std::complex<double> lambda = s.lambda[block[static_cast<size_t>(i)]];
-    B(i, i) += lambda.real();
-    if (lambda.imag() == 0) continue;
-    B(pair, pair) += lambda.real();
-    B(i, pair) -= lambda.imag();
-    B(pair++, i) += lambda.imag();
-  }
-  const Spectrum inner = spectrum_of(std::move(B));
-
-  const Index n = s.from_modes.rows(), changed = inner.lambda.size(), same = std::ssize(rest), all = changed + same;
-  Spectrum r{Eigen::VectorXcd(all), MatrixXd(n, 2 * all), MatrixXd(2 * all, n)};
-  r.lambda << inner.lambda, s.lambda(rest);
-  MatrixXd from(n, 2 * changed), to(2 * changed, n);
-  small_product(MatrixXd(s.from_modes(Eigen::all, entries)), inner.from_modes, from);
-  small_product(inner.to_modes, MatrixXd(s.to_modes(entries, Eigen::all)), to);
-  for (const Index half : {0, 1}) {
-    r.from_modes.middleCols(half * all, changed) = from.middleCols(half * changed, changed);
-    r.to_modes.middleRows(half * all, changed) = to.middleRows(half * changed, changed);
-    for (Index i = 0; i < same; ++i) {
-      const Index old = half * m + rest[static_cast<size_t>(i)];
-      r.from_modes.col(half * all + changed + i) = s.from_modes.col(old);
-      r.to_modes.row(half * all + changed + i) = s.to_modes.row(old);
-    }
-  }
-  return r;
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include "dynamics/collocation.hpp"
 #include "dynamics/small_product.hpp"
+#include "dynamics/spectrum.hpp"
 
 #include <Eigen/Core>
 
@@ -20,13 +21,6 @@ using GridPoint = Eigen::MatrixXd;
 struct Grid {
   std::array<GridPoint, collocation::points> at;
   std::array<std::vector<std::vector<GridPoint>>, collocation::points> between;
-};
-
-/// Eigenvalues and eigenvectors of a real matrix: x = from_modes z, z = to_modes x. Of a complex pair one is kept; z
-/// holds real parts, then imaginary parts. m eigenvalues: from_modes is nx x 2 m, to_modes 2 m x nx.
-struct Spectrum {
-  Eigen::VectorXcd lambda;
-  Eigen::MatrixXd from_modes, to_modes;
 };
 
 /// L of x' = L x + N(x), x = (p, u), in its eigenvectors.
