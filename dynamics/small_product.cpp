@@ -49,6 +49,9 @@ template <class Register, int registers, int columns>
   constexpr Index width = Register::width, large = registers * width;
   Index row = 0;
   for (; row + large <= f.rows; row += large) block<Register, registers, columns>(f, row, column);
+  if (row == f.rows) return;
+  if (f.rows >= large && f.rows - row > large / 2)
+    return block<Register, registers, columns>(f, f.rows - large, column);
   for (; row + width <= f.rows; row += width) block<Register, 1, columns>(f, row, column);
   if (row == f.rows) return;
   if (f.rows >= width) return block<Register, 1, columns>(f, f.rows - width, column);
@@ -64,7 +67,9 @@ template <class Register, int registers>
 [[gnu::always_inline]] inline void all_columns(const Factors& f, Index columns) {
   Index c = 0;
   for (; c + 4 <= columns; c += 4) all_rows<Register, registers, 4>(f, c);
-  for (; c < columns; ++c) all_rows<Register, 4, 1>(f, c);
+  if (columns - c == 3) all_rows<Register, registers, 3>(f, c);
+  if (columns - c == 2) all_rows<Register, 6, 2>(f, c);
+  if (columns - c == 1) all_rows<Register, 6, 1>(f, c);
 }
 
 #ifdef FLEXBOOM_PROCESSORS
