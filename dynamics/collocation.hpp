@@ -13,9 +13,6 @@ using Table = Eigen::Matrix<double, points, points>;
 
 double node(int j);
 
-/// The place k of `parts` from point j - 1 to point j.
-inline double between(int j, int k, int parts) { return node(j - 1) + (node(j) - node(j - 1)) * k / parts; }
-
 /// Values at the points, as rows, times this: coefficients of 1, c, c^2, ...
 const Table& coefficients();
 

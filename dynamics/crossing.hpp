@@ -62,6 +62,16 @@ double crossing_in_bracket(const At& at, const Clearance& from, const Clearance&
   return newton_in_bracket(at, from.c, to.c, guess, resolution);
 }
 
+/// Whether it may cross between two places so near that it has at most one dip between them: it has at the second, or
+/// the cubic has a dip that is worth following to its bottom.
+inline bool may_cross(const Clearance& from, const Clearance& to) {
+  if (to.value < 0) return true;
+  if (!(from.slope < 0 && to.slope > 0)) return false;
+  const Hermite cubic(from, to);
+  return cubic.bottom() != no_crossing &&
+         cubic(std::clamp(cubic.bottom(), from.c, to.c)).value <= 0.5 * std::min(from.value, to.value);
+}
+
 /// The first crossing between two places so near that the clearance has at most one dip between them, or one of the
 /// constants above. Contacts shorter than the distance are found by the bottom of the dip.
 template <class At>
@@ -76,12 +86,8 @@ double crossing_between(const At& at, const Clearance& from, const Clearance& to
     }
     return crossed_from_the_start;
   }
-  if (!(from.slope < 0 && to.slope > 0)) return no_crossing;
-  // The cubic says whether the dip is worth following to its bottom, where the slope is zero.
-  const Hermite cubic(from, to);
-  if (cubic.bottom() == no_crossing) return no_crossing;
-  double c = std::clamp(cubic.bottom(), from.c, to.c);
-  if (cubic(c).value > 0.5 * std::min(from.value, to.value)) return no_crossing;
+  if (!may_cross(from, to)) return no_crossing;
+  double c = std::clamp(Hermite(from, to).bottom(), from.c, to.c);
   Clearance a = from, b = to;
   for (int round = 0; round < 60 && c > a.c && c < b.c; ++round) {
     const Clearance here = at(c);

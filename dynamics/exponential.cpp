@@ -66,6 +66,11 @@ class ExponentialStepper final : public Stepper {
       middle_[m] = collocation::middle_polynomial()[m] * factorial;
     }
     step_.X.resize(nx_, points);
+    for (int i = 0; i < layout_.base; ++i) watched_.push_back(layout_.p + i);
+    for (const int gap : layout_.body)
+      for (const int entry : {gap, layout_.p + layout_.base + gap}) watched_.push_back(entry);
+    watched_x_.resize(std::ssize(watched_), inner);
+    x_at_end_.resize(nx_, 2);
     if (!system.fixed_hub()) y_[layout_.attitude()] = 1;
     if (!(scale.tolerance > 4e-16))
       throw NumericalError(fmt::format(
@@ -130,7 +135,7 @@ class ExponentialStepper final : public Stepper {
     step_.M.setZero();
     VectorXd y = start_;
     for (double t = left; t > 1e-10 * left; t /= 2) {
-      step_.M.col(0) = t * N_.col(0);
+      step_.M.col(0) = t * step_.N.col(0);
       step_.linear->point(1, t, scratch_);
       step_.linear->combine(scratch_, 0, step_.Z.col(0), step_.M, integral_);
       step_.linear->to_x(integral_, y.head(nx_));
@@ -150,6 +155,7 @@ class ExponentialStepper final : public Stepper {
  private:
   static constexpr int degree = collocation::degree;
   static constexpr int points = collocation::points;
+  static constexpr int inner = points - 2;
   using Matrix3Points = Eigen::Matrix<double, 3, points>;
   using Points = Eigen::Matrix<double, points, 1>;
 
@@ -222,13 +228,17 @@ class ExponentialStepper final : public Stepper {
     start_ = y;
     step_.Z.resize(m, points);
     step_.M.resize(m, points);
-    N_.resize(m, points);
+    step_.N.resize(m, points);
     integral_.resize(m);
+    zero_.setZero(m);
+    at_end_.resize(m, 2);
+    if (step_.linear->watched_modes.size() == 0)
+      step_.linear->watched_modes = step_.linear->from_modes(watched_, Eigen::all);
     step_.linear->to_z(y.head(nx_), step_.Z.leftCols(1));
     step_.X.col(0) = y.head(nx_);
     take_mass_centre();
     evaluate(0);
-    step_.linear->remainder(F_.leftCols(1), step_.Z.leftCols(1), N_.leftCols(1));
+    step_.linear->remainder(F_.leftCols(1), step_.Z.leftCols(1), step_.N.leftCols(1));
   }
 
   /// The end of the last step is the start of the next; N and the power there are those before momentum was kept, which
@@ -239,7 +249,7 @@ class ExponentialStepper final : public Stepper {
     start_ = reached_state_;
     step_.Z.col(0) = step_.Z.col(degree).eval();
     step_.X.col(0) = reached_state_.head(nx_);
-    N_.col(0) = N_.col(degree).eval();
+    step_.N.col(0) = step_.N.col(degree).eval();
     gravity_.col(0) = gravity_.col(degree).eval();
     if (!kept_.isZero(0)) step_.Z.col(0) += step_.linear->to_modes.middleCols<3>(layout_.p) * kept_;
     take_mass_centre();
@@ -281,7 +291,7 @@ class ExponentialStepper final : public Stepper {
       if (j == 0)
         y_ = start_;
       else
-        state_at(step_.grid->at[static_cast<size_t>(j)], collocation::node(j), y_);
+        state_at((*step_.grid)[static_cast<size_t>(j)], collocation::node(j), y_);
     }
     y_.head(nx_) = step_.X.col(j);
     const double t = j == 0 ? step_.start : step_.start + collocation::node(j) * step_.length;
@@ -297,18 +307,23 @@ class ExponentialStepper final : public Stepper {
 
   /// Sweeps until the points stand still; returns the error in units of the one allowed, infinite when they do not.
   double solve(double left) {
-    const Index m = step_.linear->size();
     predict();
     gravity_.rightCols<degree>().colwise() = gravity_.col(0).eval();  // a failed step left what it had
     double last_change = 0;
     for (int sweep = 0; sweep < max_sweeps; ++sweep) {
-      small_product(N_, step_.length * scaled_coefficients_, step_.M);
+      small_product(step_.N, step_.length * scaled_coefficients_, step_.M);
       for (int j = 1; j < points; ++j)
-        step_.linear->combine(step_.grid->at[static_cast<size_t>(j)], 0, step_.Z.col(0), step_.M, step_.Z.col(j));
-      previous_ = step_.X.col(degree);
-      step_.linear->to_x(step_.Z.rightCols(degree), step_.X.rightCols(degree));
-      const double change =
-          sweep == 0 ? std::numeric_limits<double>::infinity() : norm(step_.X.col(degree) - previous_);
+        step_.linear->combine((*step_.grid)[static_cast<size_t>(j)], 0, step_.Z.col(0), step_.M, step_.Z.col(j));
+      double change = std::numeric_limits<double>::infinity();
+      if (sweep == 0) {
+        step_.linear->to_x(step_.Z.rightCols(degree), step_.X.rightCols(degree));
+      } else {  // the end says whether the points stand still: at the others not all of x is wanted then
+        at_end_.col(0) = step_.Z.col(degree);
+        foresee_error(at_end_.col(1));
+        step_.linear->to_x(at_end_, x_at_end_);
+        change = norm(x_at_end_.col(0) - step_.X.col(degree));
+        step_.X.col(degree) = x_at_end_.col(0);
+      }
       if (!std::isfinite(change) && sweep > 0) return change;
       if (sweep > 1 && change > last_change && change > 1) return std::numeric_limits<double>::infinity();
       const double ratio = sweep > 1 ? std::min(0.9, change / last_change) : contraction_;
@@ -316,34 +331,36 @@ class ExponentialStepper final : public Stepper {
       if (sweep > 0 && change * ratio <= 0.1) break;
       if (sweep + 1 == max_sweeps) return std::numeric_limits<double>::infinity();
       last_change = change;
+      if (sweep > 0) step_.linear->to_x(step_.Z.middleCols<inner>(1), step_.X.middleCols<inner>(1));
       if (system_.field()) follow();  // gravity depends on attitude and place
       for (int j = 1; j < points; ++j) evaluate(j);
-      step_.linear->remainder(F_.rightCols(degree), step_.Z.rightCols(degree), N_.rightCols(degree));
+      step_.linear->remainder(F_.rightCols(degree), step_.Z.rightCols(degree), step_.N.rightCols(degree));
     }
+    small_product(step_.linear->watched_modes, step_.Z.middleCols<inner>(1), watched_x_);
+    step_.X.middleCols<inner>(1)(watched_, Eigen::all) = watched_x_;
     follow();
-    // What the middle point adds to the interpolation by the others.
+    double error = norm(x_at_end_.col(1));
     const Points& d = collocation::middle_difference();
-    error_modes_.noalias() = N_ * d;
-    zero_.setZero(m);
-    z_error_.resize(m);
-    M_error_.noalias() = step_.length * error_modes_ * middle_.transpose();
-    step_.linear->combine(step_.grid->at[degree], 0, zero_, M_error_, z_error_);
-    x_error_.resize(nx_);
-    step_.linear->to_x(z_error_, x_error_);
-    double error = norm(x_error_);
     const double weight = step_.length * collocation::middle_polynomial().dot(collocation::integrals(1));
     const double lost = std::abs(power_.dot(d)) * weight;
     if (!system_.fixed_hub()) {
       // What the hub's rate keeps of the error turns it: until the end, or until momentum takes it back.
       const double turning = system_.field() ? left : step_.length;
       const double turned =
-          (step_.linear->drift_modes.lazyProduct(z_error_)).norm() * turning + (turning_ * d).norm() * weight;
+          (step_.linear->drift_modes.lazyProduct(at_end_.col(1))).norm() * turning + (turning_ * d).norm() * weight;
       error = std::max(error, turned / (2 * scale_.tolerance * scale_.scale[layout_.attitude()]));
       const double fallen = (gravity_ * d).norm() * weight * left;  // and the speed of the mass centre carries it away
       error = std::max(error, fallen / (scale_.tolerance * scale_.scale[layout_.position()]));
     }
     error = std::max(error, lost / (scale_.tolerance * scale_.scale[layout_.dissipated()]));
     return error;
+  }
+
+  /// What the middle point adds to the interpolation by the others, carried to the end of the step.
+  void foresee_error(Eigen::Ref<VectorXd> z) {
+    error_modes_.noalias() = step_.N * collocation::middle_difference();
+    M_error_.noalias() = step_.length * error_modes_ * middle_.transpose();
+    step_.linear->combine((*step_.grid)[degree], 0, zero_, M_error_, z);
   }
 
   double norm(const Eigen::Ref<const VectorXd>& e) const {
@@ -353,17 +370,17 @@ class ExponentialStepper final : public Stepper {
   /// The remainder at the points of a new step: the polynomial of the last one goes on, or it stays as it is.
   void predict() {
     if (first_ || last_used_ <= 0) {
-      for (int j = 1; j < points; ++j) N_.col(j) = N_.col(0);
+      for (int j = 1; j < points; ++j) step_.N.col(j) = step_.N.col(0);
       return;
     }
     for (int j = 1; j < points; ++j) {
       const double c = 1 + collocation::node(j) * step_.length / last_used_;
-      N_.col(j).noalias() = last_N_ * collocation::monomials(c);
+      step_.N.col(j).noalias() = last_N_ * collocation::monomials(c);
     }
   }
 
   void choose_step(double error, bool last) {
-    last_N_.noalias() = N_ * collocation::coefficients();
+    last_N_.noalias() = step_.N * collocation::coefficients();
     last_used_ = step_.length;
     if (last) return;
     const double growth = std::pow(std::max(error, 1e-10), -1.0 / (degree + 1));
@@ -388,7 +405,7 @@ class ExponentialStepper final : public Stepper {
     omega = step_.X.middleRows<3>(layout_.p);
     theta0.col(0).setZero();
     for (int j = 1; j < points; ++j) {
-      step_.linear->combine(step_.grid->at[static_cast<size_t>(j)], 1, step_.Z.col(0), step_.M, integral_);
+      step_.linear->combine((*step_.grid)[static_cast<size_t>(j)], 1, step_.Z.col(0), step_.M, integral_);
       theta0.col(j).noalias() = step_.length * (step_.linear->omega_modes.lazyProduct(integral_));
     }
     theta = theta0;
@@ -409,7 +426,7 @@ class ExponentialStepper final : public Stepper {
   /// The state at a fraction c of the step.
   void state_at(double c, VectorXd& y) {
     if (c != 1) step_.linear->point(c, step_.length, scratch_);
-    state_at(c == 1 ? step_.grid->at[degree] : scratch_, c, y);
+    state_at(c == 1 ? (*step_.grid)[degree] : scratch_, c, y);
   }
   void state_at(const GridPoint& at, double c, VectorXd& y) {
     y.resize(layout_.size);
@@ -449,6 +466,7 @@ class ExponentialStepper final : public Stepper {
   WorkspaceHandle work_;
   int nx_;
   std::vector<char> contact_, armed_;
+  std::vector<int> watched_;  // entries of x that are wanted at every point: omega, gaps and their rates
   std::map<std::vector<char>, std::unique_ptr<LinearPart>> linear_parts_;
   CollocatedStep step_;
   StopSearch search_;
@@ -458,9 +476,10 @@ class ExponentialStepper final : public Stepper {
   double h_ = 0, end_ = 1, last_used_ = 0, reached_ = 0, contraction_ = 0.1;
   bool first_ = true, pending_ = false;
   VectorXd start_, reached_state_;
-  VectorXd y_, y_dot_, previous_;
-  MatrixXd F_, N_, last_N_, M_error_;
-  VectorXd error_modes_, z_error_, x_error_, zero_, integral_;
+  VectorXd y_, y_dot_;
+  MatrixXd F_, last_N_, M_error_, watched_x_;
+  MatrixXd at_end_, x_at_end_;  // of the step: z and x there, and their errors
+  VectorXd error_modes_, zero_, integral_;
   Points power_ = Points::Zero(), power_coefficients_ = Points::Zero();
   Points middle_ = Points::Zero();
   collocation::Table scaled_coefficients_;

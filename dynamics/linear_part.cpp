@@ -3,7 +3,6 @@
 #include "dynamics/phi.hpp"
 #include "fem/lanes.hpp"
 
-
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -90,26 +89,13 @@ void LinearPart::point(double c, double h, GridPoint& result) const {
 }
 
 void LinearPart::grid(double h, Grid& g) const {
-  for (int j = 1; j < collocation::points; ++j) point(collocation::node(j), h, g.at[static_cast<size_t>(j)]);
-  for (auto& levels : g.between) levels.clear();
+  for (int j = 1; j < collocation::points; ++j) point(collocation::node(j), h, g[static_cast<size_t>(j)]);
 }
 
-Grid& LinearPart::kept_grid(double h) {
+const Grid& LinearPart::kept_grid(double h) {
   const auto [place, is_new] = grids_.try_emplace(h);
   if (is_new) grid(h, place->second);
   return place->second;
-}
-
-const std::vector<GridPoint>& LinearPart::between(Grid& g, double h, int j, int level) const {
-  auto& levels = g.between[static_cast<size_t>(j)];
-  if (std::ssize(levels) <= level) levels.resize(static_cast<size_t>(level) + 1);
-  std::vector<GridPoint>& points = levels[static_cast<size_t>(level)];
-  const int parts = 1 << level;
-  if (points.empty() && parts > 1) {
-    points.resize(static_cast<size_t>(parts) - 1);
-    for (int k = 1; k < parts; ++k) point(collocation::between(j, k, parts), h, points[static_cast<size_t>(k) - 1]);
-  }
-  return points;
 }
 
 void LinearPart::combine(const GridPoint& b, int shift, const Eigen::Ref<const VectorXd>& z0, const MatrixXd& M,

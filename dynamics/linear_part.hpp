@@ -8,7 +8,6 @@
 
 #include <array>
 #include <map>
-#include <vector>
 
 namespace flexboom {
 
@@ -16,12 +15,8 @@ namespace flexboom {
 /// real parts in the upper half, imaginary parts in the lower.
 using GridPoint = Eigen::MatrixXd;
 
-/// At every collocation point, and between them where somebody looked: `between[j][l]` parts the interval that ends at
-/// point j in 2^l.
-struct Grid {
-  std::array<GridPoint, collocation::points> at;
-  std::array<std::vector<std::vector<GridPoint>>, collocation::points> between;
-};
+/// At every collocation point.
+using Grid = std::array<GridPoint, collocation::points>;
 
 /// L of x' = L x + N(x), x = (p, u), in its eigenvectors.
 struct LinearPart : Spectrum {
@@ -35,6 +30,8 @@ struct LinearPart : Spectrum {
   LinearPart(const LinearPart& other, Eigen::MatrixXd L, int column);
 
   Eigen::Index size() const { return to_modes.rows(); }
+  const Eigen::VectorXd& lambda_re() const { return lambda_re_; }
+  const Eigen::VectorXd& lambda_im() const { return lambda_im_; }
 
   /// Columns of x by those of z and back.
   void to_x(const Eigen::Ref<const Eigen::MatrixXd>& Z, Eigen::Ref<Eigen::MatrixXd> X) const {
@@ -50,20 +47,18 @@ struct LinearPart : Spectrum {
 
   void point(double c, double h, GridPoint&) const;
   void grid(double h, Grid&) const;
-  Grid& kept_grid(double h);  // kept for the next step of the same size
-
-  /// The points that part the interval before point j in 2^level.
-  const std::vector<GridPoint>& between(Grid&, double h, int j, int level) const;
+  const Grid& kept_grid(double h);  // kept for the next step of the same size
 
   /// z at a point (shift 0), or its integral from the start over h (shift 1). M: the remainder's
   /// coefficients of c^m, times h m!.
   void combine(const GridPoint&, int shift, const Eigen::Ref<const Eigen::VectorXd>& z0, const Eigen::MatrixXd& M,
                Eigen::Ref<Eigen::VectorXd> z) const;
 
-  Eigen::MatrixXd L;            // nx x nx, in full
-  Eigen::MatrixXd of_modes;     // from_modes, transposed: a coordinate of x by z
-  Eigen::MatrixXd omega_modes;  // omega by z
-  Eigen::MatrixXd drift_modes;  // omega by the part of z that stays: eigenvalues that are zero
+  Eigen::MatrixXd L;              // nx x nx, in full
+  Eigen::MatrixXd of_modes;       // from_modes, transposed: a coordinate of x by z
+  Eigen::MatrixXd omega_modes;    // omega by z
+  Eigen::MatrixXd drift_modes;    // omega by the part of z that stays: eigenvalues that are zero
+  Eigen::MatrixXd watched_modes;  // some entries of x by z, for who wants them alone
   Eigen::VectorXd base;
   int first_omega;
   double step = 0;  // to try first after an event: that of the last time, or a longer one where its error was small

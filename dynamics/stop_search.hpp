@@ -4,6 +4,7 @@
 #include "dynamics/linear_part.hpp"
 #include "dynamics/system.hpp"
 
+#include <complex>
 #include <span>
 #include <utility>
 #include <vector>
@@ -13,9 +14,9 @@ namespace flexboom {
 /// One step of exponential collocation: x = (p, u) at every place of it.
 struct CollocatedStep {
   LinearPart* linear = nullptr;
-  Grid* grid = nullptr;
+  const Grid* grid = nullptr;
   double start = 0, length = 0;  // [s]
-  Eigen::MatrixXd X, Z;          // x and its coefficients at the points, a column each
+  Eigen::MatrixXd X, Z, N;       // x (ends: all; inner points: gaps, rates), its coefficients, their remainders
   Eigen::MatrixXd M;             // of the remainder, see LinearPart::combine
 };
 
@@ -30,19 +31,44 @@ class StopSearch {
                         std::span<int> crossed);
 
  private:
-  /// Vibration of a gap that the points of a step are too far apart for.
-  struct Ripple {
-    double turn = 0;       // angle that the fastest of it goes through in a step
-    double amplitude = 0;  // all of it
+  /// What changes in the gap faster than the points of a step show: the real part of each.
+  struct Fast {
+    Eigen::Index mode;
+    std::complex<double> rate;                   // eigenvalue times the length of the step
+    std::complex<double> share;                  // of the gap, at a point
+    std::complex<double> factor = 0, drift = 0;  // from one place to the next; by the end
   };
 
-  /// Of entry `at` of x, from a point of the step on.
-  Ripple ripple(const CollocatedStep&, int at, int point);
+  /// All of it that vibrates.
+  struct Ripple {
+    double turn = 0;       // angle that the fastest goes through in a step
+    double amplitude = 0;  // together
+  };
+
+  /// Sets `rates_`: what each mode has of the rate of an entry of x at a point.
+  void take_rates(const CollocatedStep&, int entry, int point);
+  /// Of that entry, beyond where the remainder holds it.
+  std::complex<double> share_of(const CollocatedStep&, Eigen::Index mode) const;
+
+  /// Of a gap (an entry of x) from a point of the step on; sets `fast_`.
+  Ripple ripple(const CollocatedStep&, int gap, int point);
   double first_crossing(const CollocatedStep&, int hinge, double side, double end);
+
+  struct Places {
+    int gap, to;  // entry of x; point at the end
+    int parts;
+    double side, resolution;
+  };
+
+  /// Between two points, at places in between: nearly, by `fast_` and the two points, and exactly where it may cross.
+  template <class At>
+  double crossing_at_places(const CollocatedStep&, const At& at, const Clearance& from, const Clearance& to,
+                            const Places&);
 
   const Layout& layout_;
   std::vector<std::pair<int, double>> roots_;
-  Eigen::VectorXd z_, amplitude_;
+  std::vector<Fast> fast_;
+  Eigen::VectorXd z_, rates_, sizes_;  // rates: real parts, then imaginary parts; sizes: their squares
   GridPoint scratch_;
 };
 
