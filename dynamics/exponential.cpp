@@ -1,14 +1,13 @@
 #include "dynamics/exponential.hpp"
 
+#include "dynamics/hub_motion.hpp"
 #include "dynamics/linear_part.hpp"
-#include "dynamics/rotation.hpp"
 #include "dynamics/small_product.hpp"
 #include "dynamics/stop_search.hpp"
 #include "dynamics/workspace.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
-#include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <cmath>
@@ -32,21 +31,6 @@ constexpr double rung = 1.4142135623730951;  // between step sizes
 /// The nearest of the step sizes that grids are kept for.
 double on_ladder(double h) { return std::exp2(std::round(2 * std::log2(h)) / 2); }
 
-/// d(rotation vector)/dt - omega, omega in body axes (Bortz 1971).
-Vector3d turning(const Vector3d& theta, const Vector3d& omega) {
-  const double a = theta.norm();
-  const double c = a < 1e-2 ? (1 + a * a / 60) / 12 : (1 - 0.5 * a / std::tan(0.5 * a)) / (a * a);
-  return 0.5 * theta.cross(omega) + c * theta.cross(theta.cross(omega));
-}
-
-Vector4d quaternion_of(const Vector3d& theta) {
-  const double half = 0.5 * theta.norm();
-  const double s = half < 1e-4 ? 0.5 * (1 - half * half / 6) : 0.5 * std::sin(half) / half;
-  Vector4d q;
-  q << std::cos(half), s * theta;
-  return q;
-}
-
 class ExponentialStepper final : public Stepper {
  public:
   ExponentialStepper(const System& system, const ErrorScale& scale)
@@ -55,6 +39,7 @@ class ExponentialStepper final : public Stepper {
         scale_(scale),
         work_(system.workspace()),
         nx_(layout_.p + layout_.u),
+        motion_(system, scale, *work_),
         search_(layout_),
         y_(VectorXd::Zero(layout_.size)),
         y_dot_(layout_.size),
@@ -80,8 +65,6 @@ class ExponentialStepper final : public Stepper {
   void restart(double t, const VectorXd& y, std::span<const char> contact, std::span<const char> armed) override {
     step_.start = t;
     pending_ = false;
-    if (!angular_momentum_ && !system_.fixed_hub())
-      angular_momentum_ = rotation_matrix(y.segment<4>(layout_.attitude())) * system_.whole(y, *work_).angular_momentum;
     contact_.assign(contact.begin(), contact.end());
     armed_.assign(armed.begin(), armed.end());
     step_.linear = &linear_part();
@@ -116,14 +99,21 @@ class ExponentialStepper final : public Stepper {
       if (!std::isfinite(error)) relinearise(failures < 6 ? 1e-3 : 1e-9);
     }
     end_ = search_.first_crossing(step_, contact_, armed_, crossed);
-    if (end_ > 0)
-      state_at(end_, y);
-    else
+    if (end_ == 0) {
       y = start_;
+    } else if (end_ == 1) {
+      y.head(nx_) = step_.X.col(degree);
+      motion_.turn(step_, (*step_.grid)[degree], 1, y);
+    } else {
+      step_.linear->point(end_, step_.length, scratch_);
+      step_.linear->combine(scratch_, 0, step_.Z.col(0), step_.M, integral_);
+      step_.linear->to_x(integral_, y.head(nx_));
+      motion_.turn(step_, scratch_, end_, y);
+    }
     t = step_.start + end_ * step_.length;
     if (end_ == 1 && step_.length == t_end - step_.start) t = t_end;
-    kept_ = keep_momentum(y);
-    if (!kept_.isZero(0)) place(end_, y);
+    kept_ = motion_.keep_momentum(y);
+    motion_.place(step_, end_, y);
     pending_ = true;
     reached_ = t;
     reached_state_ = y;
@@ -135,20 +125,35 @@ class ExponentialStepper final : public Stepper {
     step_.M.setZero();
     VectorXd y = start_;
     for (double t = left; t > 1e-10 * left; t /= 2) {
+      step_.length = t;
       step_.M.col(0) = t * step_.N.col(0);
       step_.linear->point(1, t, scratch_);
       step_.linear->combine(scratch_, 0, step_.Z.col(0), step_.M, integral_);
       step_.linear->to_x(integral_, y.head(nx_));
-      if (!system_.fixed_hub()) {
-        step_.linear->combine(scratch_, 1, step_.Z.col(0), step_.M, integral_);
-        turn(start_.segment<4>(layout_.attitude()), t * step_.linear->omega_modes.lazyProduct(integral_), y);
-        place(com_ + t * com_velocity_, com_velocity_, y);
-      }
+      motion_.turn(step_, scratch_, 1, y);
+      motion_.place(step_, 1, y);
       if (y.allFinite()) look(y);
     }
   }
 
-  void interpolate(double t, VectorXd& y) override { state_at((t - step_.start) / step_.length, y); }
+  void interpolate(double t, VectorXd& y) override {
+    MatrixXd Y(y.size(), 1);
+    interpolate_all(std::span(&t, 1), Y);
+    y = Y;
+  }
+
+  void interpolate_all(std::span<const double> times, MatrixXd& Y) override {
+    const auto count = std::ssize(times);
+    between_.resize(step_.linear->size(), count);
+    const auto fraction = [&](Index i) { return (times[static_cast<size_t>(i)] - step_.start) / step_.length; };
+    for (Index i = 0; i < count; ++i) {
+      step_.linear->point(fraction(i), step_.length, scratch_);
+      step_.linear->combine(scratch_, 0, step_.Z.col(0), step_.M, between_.col(i));
+      motion_.turn(step_, scratch_, fraction(i), Y.col(i));
+    }
+    step_.linear->to_x(between_, Y.topLeftCorner(nx_, count));
+    for (Index i = 0; i < count; ++i) motion_.place(step_, fraction(i), Y.col(i));
+  }
 
   StepCounts counts() const override { return counts_; }
 
@@ -156,9 +161,6 @@ class ExponentialStepper final : public Stepper {
   static constexpr int degree = collocation::degree;
   static constexpr int points = collocation::points;
   static constexpr int inner = points - 2;
-  using Matrix3Points = Eigen::Matrix<double, 3, points>;
-  using Points = Eigen::Matrix<double, points, 1>;
-
   /// The linear part for the stops that are closed, made when first met.
   LinearPart& linear_part() {
     auto& place = linear_parts_[contact_];
@@ -236,7 +238,7 @@ class ExponentialStepper final : public Stepper {
       step_.linear->watched_modes = step_.linear->from_modes(watched_, Eigen::all);
     step_.linear->to_z(y.head(nx_), step_.Z.leftCols(1));
     step_.X.col(0) = y.head(nx_);
-    take_mass_centre();
+    motion_.start(y);
     evaluate(0);
     step_.linear->remainder(F_.leftCols(1), step_.Z.leftCols(1), step_.N.leftCols(1));
   }
@@ -245,70 +247,36 @@ class ExponentialStepper final : public Stepper {
   /// is less than the error that was allowed.
   void advance_start() {
     pending_ = false;
+    motion_.go_on(step_, reached_state_);
     step_.start = reached_;
     start_ = reached_state_;
     step_.Z.col(0) = step_.Z.col(degree).eval();
     step_.X.col(0) = reached_state_.head(nx_);
     step_.N.col(0) = step_.N.col(degree).eval();
-    gravity_.col(0) = gravity_.col(degree).eval();
     if (!kept_.isZero(0)) step_.Z.col(0) += step_.linear->to_modes.middleCols<3>(layout_.p) * kept_;
-    take_mass_centre();
-    power_[0] = power_[degree];
     first_ = false;
   }
 
-  /// What only the outside could change is as it was at the start: angular momentum. A wrong attitude is turned, a
-  /// wrong rate is made faster or slower, each by its size; where there is a momentum, mostly the attitude, for that
-  /// acts back on nothing. Returns what it added to omega.
-  Vector3d keep_momentum(VectorXd& y) {
-    if (system_.fixed_hub() || system_.field()) return Vector3d::Zero();
-    const double rate = 0.01 * scale_.scale[layout_.p], angle = 2 * scale_.scale[layout_.attitude()];
-    const Whole whole = system_.whole(y, *work_);
-    const Eigen::Matrix3d A = rotation_matrix(y.segment<4>(layout_.attitude())), &J = whole.inertia;
-    const Vector3d& H = whole.angular_momentum;
-    const Vector3d lost = A.transpose() * *angular_momentum_ - H;
-    // The least (added / rate)^2 + (turned / angle)^2 for which J added + turned x H = lost.
-    const Eigen::Matrix3d W = rate * rate * J * J.transpose() +
-                              angle * angle * (H.squaredNorm() * Eigen::Matrix3d::Identity() - H * H.transpose());
-    const Vector3d pull = W.ldlt().solve(lost), added = rate * rate * J.transpose() * pull;
-    y.segment<3>(layout_.p) += added;
-    turn(y.segment<4>(layout_.attitude()), angle * angle * H.cross(pull), y);
-    return added;
-  }
-
-  /// Of the start.
-  void take_mass_centre() {
-    if (system_.fixed_hub()) return;
-    const Whole whole = system_.whole(start_, *work_);
-    const Eigen::Matrix3d A = rotation_matrix(start_.segment<4>(layout_.attitude()));
-    com_ = start_.segment<3>(layout_.position()) + A * whole.mass_centre;
-    com_velocity_ = start_.segment<3>(layout_.velocity()) + A * whole.velocity;
-  }
-
-  /// F, gravity at the mass centre (inertial axes) and dissipated power at point j.
+  /// F and what the motion of the hub needs at point j.
   void evaluate(int j) {
-    if (system_.field()) {
-      if (j == 0)
-        y_ = start_;
-      else
-        state_at((*step_.grid)[static_cast<size_t>(j)], collocation::node(j), y_);
-    }
+    const double c = collocation::node(j);
     y_.head(nx_) = step_.X.col(j);
-    const double t = j == 0 ? step_.start : step_.start + collocation::node(j) * step_.length;
+    if (system_.field() && j == 0) y_ = start_;
+    if (system_.field() && j > 0) {
+      motion_.turn(step_, (*step_.grid)[static_cast<size_t>(j)], c, y_);
+      motion_.place(step_, c, y_);
+    }
+    const double t = j == 0 ? step_.start : step_.start + c * step_.length;
     system_.derivative(t, y_.data(), contact_, *work_, y_dot_.data());
     ++counts_.rhs_evaluations;
     F_.col(j) = y_dot_.head(nx_);
-    power_[j] = y_dot_[layout_.dissipated()];
-    if (!system_.field()) return;
-    const LocalGravity g = system_.field()->at(t, y_.segment<3>(layout_.position()));
-    const Eigen::Matrix3d A = rotation_matrix(y_.segment<4>(layout_.attitude()));
-    gravity_.col(j) = g.at(A * system_.whole(y_, *work_).mass_centre).acceleration;
+    motion_.take(j, y_dot_[layout_.dissipated()], t, y_);
   }
 
   /// Sweeps until the points stand still; returns the error in units of the one allowed, infinite when they do not.
   double solve(double left) {
     predict();
-    gravity_.rightCols<degree>().colwise() = gravity_.col(0).eval();  // a failed step left what it had
+    motion_.forget();  // a failed step left what it had
     double last_change = 0;
     for (int sweep = 0; sweep < max_sweeps; ++sweep) {
       small_product(step_.N, step_.length * scaled_coefficients_, step_.M);
@@ -332,28 +300,14 @@ class ExponentialStepper final : public Stepper {
       if (sweep + 1 == max_sweeps) return std::numeric_limits<double>::infinity();
       last_change = change;
       if (sweep > 0) step_.linear->to_x(step_.Z.middleCols<inner>(1), step_.X.middleCols<inner>(1));
-      if (system_.field()) follow();  // gravity depends on attitude and place
+      if (system_.field()) motion_.follow(step_);  // gravity depends on attitude and place
       for (int j = 1; j < points; ++j) evaluate(j);
       step_.linear->remainder(F_.rightCols(degree), step_.Z.rightCols(degree), step_.N.rightCols(degree));
     }
     small_product(step_.linear->watched_modes, step_.Z.middleCols<inner>(1), watched_x_);
     step_.X.middleCols<inner>(1)(watched_, Eigen::all) = watched_x_;
-    follow();
-    double error = norm(x_at_end_.col(1));
-    const Points& d = collocation::middle_difference();
-    const double weight = step_.length * collocation::middle_polynomial().dot(collocation::integrals(1));
-    const double lost = std::abs(power_.dot(d)) * weight;
-    if (!system_.fixed_hub()) {
-      // What the hub's rate keeps of the error turns it: until the end, or until momentum takes it back.
-      const double turning = system_.field() ? left : step_.length;
-      const double turned =
-          (step_.linear->drift_modes.lazyProduct(at_end_.col(1))).norm() * turning + (turning_ * d).norm() * weight;
-      error = std::max(error, turned / (2 * scale_.tolerance * scale_.scale[layout_.attitude()]));
-      const double fallen = (gravity_ * d).norm() * weight * left;  // and the speed of the mass centre carries it away
-      error = std::max(error, fallen / (scale_.tolerance * scale_.scale[layout_.position()]));
-    }
-    error = std::max(error, lost / (scale_.tolerance * scale_.scale[layout_.dissipated()]));
-    return error;
+    motion_.follow(step_);
+    return std::max(norm(x_at_end_.col(1)), motion_.error(step_, at_end_.col(1), left));
   }
 
   /// What the middle point adds to the interpolation by the others, carried to the end of the step.
@@ -373,14 +327,15 @@ class ExponentialStepper final : public Stepper {
       for (int j = 1; j < points; ++j) step_.N.col(j) = step_.N.col(0);
       return;
     }
-    for (int j = 1; j < points; ++j) {
-      const double c = 1 + collocation::node(j) * step_.length / last_used_;
-      step_.N.col(j).noalias() = last_N_ * collocation::monomials(c);
-    }
+    collocation::Table beyond;
+    for (int j = 0; j < points; ++j)
+      beyond.col(j) = collocation::monomials(1 + collocation::node(j) * step_.length / last_used_);
+    small_product(last_N_, beyond.rightCols<degree>(), step_.N.rightCols<degree>());
   }
 
   void choose_step(double error, bool last) {
-    last_N_.noalias() = step_.N * collocation::coefficients();
+    last_N_.resizeLike(step_.N);
+    small_product(step_.N, collocation::coefficients(), last_N_);
     last_used_ = step_.length;
     if (last) return;
     const double growth = std::pow(std::max(error, 1e-10), -1.0 / (degree + 1));
@@ -395,71 +350,6 @@ class ExponentialStepper final : public Stepper {
     return on_ladder(h);
   }
 
-  /// What follows p and u: attitude, motion of the mass centre, dissipated energy. Within a step it acts back in a
-  /// field of gravity only.
-  void follow() {
-    const auto to_coefficients = collocation::coefficients();
-    power_coefficients_ = to_coefficients.transpose() * power_;
-    if (system_.fixed_hub()) return;
-    Matrix3Points omega, theta0, theta;
-    omega = step_.X.middleRows<3>(layout_.p);
-    theta0.col(0).setZero();
-    for (int j = 1; j < points; ++j) {
-      step_.linear->combine((*step_.grid)[static_cast<size_t>(j)], 1, step_.Z.col(0), step_.M, integral_);
-      theta0.col(j).noalias() = step_.length * (step_.linear->omega_modes.lazyProduct(integral_));
-    }
-    theta = theta0;
-    for (int round = 0; round < 20; ++round) {
-      for (int j = 0; j < points; ++j) turning_.col(j) = turning(theta.col(j), omega.col(j));
-      C_.noalias() = turning_ * to_coefficients;
-      double change = 0;
-      for (int j = 1; j < points; ++j) {
-        const Vector3d next = theta0.col(j) + step_.length * (C_ * collocation::integrals(collocation::node(j)));
-        change = std::max(change, (next - theta.col(j)).norm());
-        theta.col(j) = next;
-      }
-      if (change <= 1e-16) break;
-    }
-    falling_.noalias() = gravity_ * to_coefficients;
-  }
-
-  /// The state at a fraction c of the step.
-  void state_at(double c, VectorXd& y) {
-    if (c != 1) step_.linear->point(c, step_.length, scratch_);
-    state_at(c == 1 ? (*step_.grid)[degree] : scratch_, c, y);
-  }
-  void state_at(const GridPoint& at, double c, VectorXd& y) {
-    y.resize(layout_.size);
-    step_.linear->combine(at, 0, step_.Z.col(0), step_.M, integral_);
-    step_.linear->to_x(integral_, y.head(nx_));
-    y[layout_.dissipated()] =
-        start_[layout_.dissipated()] + step_.length * power_coefficients_.dot(collocation::integrals(c));
-    if (system_.fixed_hub()) return;
-    const auto I = collocation::integrals(c);
-    step_.linear->combine(at, 1, step_.Z.col(0), step_.M, integral_);
-    const Vector3d theta = step_.length * (step_.linear->omega_modes.lazyProduct(integral_) + C_ * I);
-    turn(start_.segment<4>(layout_.attitude()), theta, y);
-    place(c, y);
-  }
-
-  /// The attitude: one before, turned by a rotation vector.
-  void turn(const Vector4d& before, const Vector3d& theta, VectorXd& y) const {
-    y.segment<4>(layout_.attitude()) = quaternion_product(before, quaternion_of(theta));
-  }
-
-  /// The hub at a fraction c of the step, by p, u and attitude: forces between the bodies do not move the mass centre.
-  void place(double c, VectorXd& y) const {
-    const Vector3d fallen = step_.length * (falling_ * collocation::double_integrals(c));
-    place(com_ + step_.length * (c * com_velocity_ + fallen),
-          com_velocity_ + step_.length * (falling_ * collocation::integrals(c)), y);
-  }
-  void place(const Vector3d& com, const Vector3d& com_velocity, VectorXd& y) const {
-    const Whole whole = system_.whole(y, *work_);
-    const Eigen::Matrix3d A = rotation_matrix(y.segment<4>(layout_.attitude()));
-    y.segment<3>(layout_.velocity()) = com_velocity - A * whole.velocity;
-    y.segment<3>(layout_.position()) = com - A * whole.mass_centre;
-  }
-
   const System& system_;
   const Layout& layout_;
   const ErrorScale& scale_;
@@ -469,6 +359,7 @@ class ExponentialStepper final : public Stepper {
   std::vector<int> watched_;  // entries of x that are wanted at every point: omega, gaps and their rates
   std::map<std::vector<char>, std::unique_ptr<LinearPart>> linear_parts_;
   CollocatedStep step_;
+  HubMotion motion_;
   StopSearch search_;
   Grid spare_;
   GridPoint scratch_;
@@ -477,17 +368,12 @@ class ExponentialStepper final : public Stepper {
   bool first_ = true, pending_ = false;
   VectorXd start_, reached_state_;
   VectorXd y_, y_dot_;
-  MatrixXd F_, last_N_, M_error_, watched_x_;
+  MatrixXd F_, last_N_, M_error_, watched_x_, between_;
   MatrixXd at_end_, x_at_end_;  // of the step: z and x there, and their errors
   VectorXd error_modes_, zero_, integral_;
-  Points power_ = Points::Zero(), power_coefficients_ = Points::Zero();
-  Points middle_ = Points::Zero();
+  collocation::Values middle_ = collocation::Values::Zero();
   collocation::Table scaled_coefficients_;
-  Vector3d com_ = Vector3d::Zero(), com_velocity_ = Vector3d::Zero();
   Vector3d kept_ = Vector3d::Zero();
-  std::optional<Vector3d> angular_momentum_;
-  Matrix3Points turning_ = Matrix3Points::Zero(), C_ = Matrix3Points::Zero(), gravity_ = Matrix3Points::Zero(),
-                falling_ = Matrix3Points::Zero();
   StepCounts counts_;
 };
 

@@ -195,8 +195,8 @@ class Flight {
         outputs_(options),
         t_(options.start),
         y_(y0),
-        sample_(y0),
         y_dot_(y0.size()),
+        samples_(y0.size(), 16),
         work_(system.workspace()),
         crossed_(contacts_.closed.size(), 0) {}
 
@@ -235,22 +235,27 @@ class Flight {
   }
 
   void write_outputs() {
-    for (double next = output_time(); next <= t_ && !stopped(); next = output_time()) {
-      if (options_.progress && result_.time.size() % 1024 == 0) options_.progress(next, options_.duration);
-      if (next == t_) {
-        sample_ = y_;
-      } else {
-        stepper_->interpolate(next, sample_);
-      }
-      record(next, sample_);
+    for (outputs_within_step(); !times_.empty() && !stopped(); outputs_within_step()) {
+      stepper_->interpolate_all(times_, samples_);
+      for (size_t i = 0; i < times_.size(); ++i) record(times_[i], samples_.col(static_cast<Eigen::Index>(i)));
+    }
+    if (outputs_.after(result_.time.size()) == t_ && !stopped()) record(t_, y_);
+  }
+
+  /// The next ones before its end, as many as go at once.
+  void outputs_within_step() {
+    times_.clear();
+    for (Eigen::Index i = 0; i < samples_.cols(); ++i) {
+      const double next = outputs_.after(result_.time.size() + times_.size());
+      if (!(next < t_)) break;
+      times_.push_back(next);
     }
   }
 
-  double output_time() const { return outputs_.after(result_.time.size()); }
-
-  void record(double t, const VectorXd& y) {
+  void record(double t, const Eigen::Ref<const VectorXd>& y) {
+    if (options_.progress && result_.time.size() % 1024 == 0) options_.progress(t, options_.duration);
     result_.time.push_back(t);
-    result_.y.push_back(y);
+    result_.y.emplace_back(y);
     if (!system_.fixed_hub()) {
       auto attitude = result_.y.back().segment<4>(system_.layout().attitude());
       double& drift = result_.summary.constraint_drift;
@@ -360,7 +365,9 @@ class Flight {
   Contacts contacts_;
   OutputTimes outputs_;
   double t_;
-  VectorXd y_, sample_, y_dot_;
+  VectorXd y_, y_dot_;
+  std::vector<double> times_;  // of outputs within a step, and their states
+  Eigen::MatrixXd samples_;
   WorkspaceHandle work_;
   std::vector<int> crossed_;
   long steps_ = 0;
@@ -368,6 +375,14 @@ class Flight {
 };
 
 }  // namespace
+
+void Stepper::interpolate_all(std::span<const double> times, Eigen::MatrixXd& Y) {
+  VectorXd y(Y.rows());
+  for (size_t i = 0; i < times.size(); ++i) {
+    interpolate(times[i], y);
+    Y.col(static_cast<Eigen::Index>(i)) = y;
+  }
+}
 
 std::span<const IntegratorMethod> integrator_methods() { return methods; }
 

@@ -88,6 +88,8 @@ class Stepper {
   virtual void foresee(double /*t_end*/, const std::function<void(const Eigen::VectorXd& y)>&) {}
   /// y within the last step.
   virtual void interpolate(double t, Eigen::VectorXd& y) = 0;
+  /// States within the last step, a column each; Y has the size of a state, and as many columns or more.
+  virtual void interpolate_all(std::span<const double> times, Eigen::MatrixXd& Y);
   virtual StepCounts counts() const = 0;
 };
 
