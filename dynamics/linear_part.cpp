@@ -57,7 +57,8 @@ LinearPart::LinearPart(Spectrum spectrum, MatrixXd L_of_x, int omega_in_x, Vecto
       base(std::move(base_p)),
       first_omega(omega_in_x),
       lambda_re_(lambda.real()),
-      lambda_im_(lambda.imag()) {
+      lambda_im_(lambda.imag()),
+      used_(lambda.size() + (lambda_im_.array() != 0).count()) {
   if (first_omega < 0) return;
   omega_modes = from_modes.middleRows<3>(first_omega);
   drift_modes = omega_modes;

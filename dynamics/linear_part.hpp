@@ -35,10 +35,11 @@ struct LinearPart : Spectrum {
 
   /// Columns of x by those of z and back.
   void to_x(const Eigen::Ref<const Eigen::MatrixXd>& Z, Eigen::Ref<Eigen::MatrixXd> X) const {
-    small_product(from_modes, Z, X);
+    small_product(from_modes.leftCols(used_), Z.topRows(used_), X);
   }
   void to_z(const Eigen::Ref<const Eigen::MatrixXd>& X, Eigen::Ref<Eigen::MatrixXd> Z) const {
-    small_product(to_modes, X, Z);
+    small_product(to_modes.topRows(used_), X, Z.topRows(used_));
+    Z.bottomRows(size() - used_).setZero();
   }
 
   /// N = to_modes F - lambda z, columns at a time.
@@ -67,6 +68,7 @@ struct LinearPart : Spectrum {
   LinearPart(Spectrum, Eigen::MatrixXd L, int first_omega, Eigen::VectorXd base);
 
   Eigen::VectorXd lambda_re_, lambda_im_;
+  Eigen::Index used_;  // of z: the rest is always zero
   std::map<double, Grid> grids_;
 };
 

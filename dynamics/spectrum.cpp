@@ -53,17 +53,18 @@ Spectrum spectrum_of(MatrixXd L) {
         fmt::format("exponential: the Jacobian has no full set of eigenvectors ({:.2g}); try bdf", growth));
   const Index m = (eigen.imaginary.array() >= 0).count();
   Spectrum s{Eigen::VectorXcd(m), MatrixXd::Zero(L.rows(), 2 * m), MatrixXd::Zero(2 * m, L.rows())};
-  for (Index i = 0, k = 0; i < m; ++i) {
+  const Index pairs = (eigen.imaginary.array() > 0).count();
+  for (Index k = 0, pair = 0, alone = pairs; k < L.rows(); ++k) {
+    const bool is_pair = eigen.imaginary[k] > 0;
+    const Index i = is_pair ? pair++ : alone++;
+    const double twice = is_pair ? 2 : 1;
     s.lambda[i] = {eigen.real[k], eigen.imaginary[k]};
-    const bool pair = eigen.imaginary[k] > 0;
-    const double twice = pair ? 2 : 1;
     s.from_modes.col(i) = twice * D.cwiseProduct(eigen.vectors.col(k));
     s.to_modes.row(i) = inverse.row(k).cwiseQuotient(twice * D.transpose());
+    if (!is_pair) continue;
     ++k;
-    if (!pair) continue;
     s.from_modes.col(m + i) = -twice * D.cwiseProduct(eigen.vectors.col(k));
     s.to_modes.row(m + i) = -inverse.row(k).cwiseQuotient(twice * D.transpose());
-    ++k;
   }
   return s;
 }
@@ -89,18 +90,24 @@ Spectrum with_column(const Spectrum& s, const VectorXd& d, int column) {
   const Spectrum inner = rank_one_spectrum(s.lambda(block), w(entries), v(entries));
 
   const Index n = s.from_modes.rows(), changed = inner.lambda.size(), same = std::ssize(rest), all = changed + same;
-  Spectrum r{Eigen::VectorXcd(all), MatrixXd(n, 2 * all), MatrixXd(2 * all, n)};
-  r.lambda << inner.lambda, s.lambda(rest);
+  Eigen::VectorXcd lambda(all);  // those that changed, then the others
+  lambda << inner.lambda, s.lambda(rest);
   MatrixXd from(n, 2 * changed), to(2 * changed, n);
   small_product(MatrixXd(s.from_modes(Eigen::all, entries)), inner.from_modes, from);
   small_product(inner.to_modes, MatrixXd(s.to_modes(entries, Eigen::all)), to);
-  for (const Index half : {0, 1}) {
-    r.from_modes.middleCols(half * all, changed) = from.middleCols(half * changed, changed);
-    r.to_modes.middleRows(half * all, changed) = to.middleRows(half * changed, changed);
-    for (Index i = 0; i < same; ++i) {
-      const Index old = half * m + rest[static_cast<size_t>(i)];
-      r.from_modes.col(half * all + changed + i) = s.from_modes.col(old);
-      r.to_modes.row(half * all + changed + i) = s.to_modes.row(old);
+  Spectrum r{Eigen::VectorXcd(all), MatrixXd(n, 2 * all), MatrixXd(2 * all, n)};
+  for (Index i = 0, pair = 0, alone = (lambda.imag().array() != 0).count(); i < all; ++i) {
+    const Index place = lambda[i].imag() != 0 ? pair++ : alone++;
+    r.lambda[place] = lambda[i];
+    for (const Index half : {0, 1}) {
+      if (i < changed) {
+        r.from_modes.col(half * all + place) = from.col(half * changed + i);
+        r.to_modes.row(half * all + place) = to.row(half * changed + i);
+      } else {
+        const Index old = half * m + rest[static_cast<size_t>(i - changed)];
+        r.from_modes.col(half * all + place) = s.from_modes.col(old);
+        r.to_modes.row(half * all + place) = s.to_modes.row(old);
+      }
     }
   }
   return r;

@@ -6,7 +6,7 @@ namespace flexboom {
 
 /// Eigenvalues and eigenvectors of a real matrix: x = from_modes z, z = to_modes x. Of a complex pair the one with the
 /// positive imaginary part is kept; z holds real parts, then imaginary parts. m eigenvalues: from_modes is nx x 2 m,
-/// to_modes 2 m x nx.
+/// to_modes 2 m x nx. Pairs come first: the imaginary parts of real eigenvalues, at the end, are zero.
 struct Spectrum {
   Eigen::VectorXcd lambda;
   Eigen::MatrixXd from_modes, to_modes;
