@@ -55,26 +55,26 @@ Sums sums_at(const Numbers& lambda, const Numbers& p, Complex origin, Complex de
   return {{one_re, one_im}, {two_re, two_im}, {plain_re, plain_im}, size};
 }
 
-/// Sum of 1 / (mu_j - mu_k) over k that are not j, mu = origin + delta.
-Complex repulsion(const Numbers& origin, const Numbers& delta, Index j) {
-  const double *o_re = origin.re.data(), *o_im = origin.im.data(), *d_re = delta.re.data(), *d_im = delta.im.data();
+/// Sum of 1 / (mu_j - mu_k) over k that are not j, mu = lambda + delta.
+Complex repulsion(const Numbers& lambda, const Numbers& delta, Index j) {
+  const double *l_re = lambda.re.data(), *l_im = lambda.im.data(), *d_re = delta.re.data(), *d_im = delta.im.data();
   double re = 0, im = 0;
-  for (const auto& [begin, end] : {std::pair(Index(0), j), std::pair(j + 1, origin.size())})
+  for (const auto& [begin, end] : {std::pair(Index(0), j), std::pair(j + 1, lambda.size())})
     for (Index k = begin; k < end; ++k) {
-      const double x = (o_re[j] - o_re[k]) + (d_re[j] - d_re[k]), y = (o_im[j] - o_im[k]) + (d_im[j] - d_im[k]);
+      const double x = (l_re[j] - l_re[k]) + (d_re[j] - d_re[k]), y = (l_im[j] - l_im[k]) + (d_im[j] - d_im[k]);
       const double scale = 1 / (x * x + y * y);
       re += x * scale, im -= y * scale;
     }
   return {re, im};
 }
 
-/// Poles lambda_i and the roots of 1 + sum p_i / (lambda_i - mu), each kept as its distance from a pole: near one, that
-/// has the digits. Both come with their conjugates.
+/// Poles lambda_i and the roots of 1 + sum p_i / (lambda_i - mu), each kept as its distance from the pole that it came
+/// from: near that, it has the digits. Both come with their conjugates.
 class Secular {
  public:
   /// Of each pair one; p alike.
   Secular(const VectorXcd& lambda, const VectorXcd& p)
-      : mirror_(mirrors(lambda)), lambda_(count()), p_(count()), origin_(count()), delta_(count()) {
+      : mirror_(mirrors(lambda)), lambda_(count()), p_(count()), delta_(count()) {
     for (Index i = 0; i < count(); ++i) {
       const bool given = i < lambda.size();
       lambda_.set(i, given ? lambda[i] : std::conj(lambda_[mirror(i)]));
@@ -82,7 +82,6 @@ class Secular {
     }
     start();
     iterate();
-    from_nearest_poles();
     pair_roots();
   }
 
@@ -91,29 +90,11 @@ class Secular {
 
   /// Of each pair one, with its positive imaginary part.
   const std::vector<Index>& roots() const { return roots_; }
-  bool is_real(Index root) const { return delta_.im[root] == -origin_.im[root]; }
-  Complex root(Index j) const { return origin_[j] + delta_[j]; }
+  bool is_real(Index root) const { return delta_.im[root] == -lambda_.im[root]; }
+  Complex root(Index j) const { return lambda_[j] + delta_[j]; }
 
   /// Of a root from a pole: mu_j - lambda_i.
-  Complex distance(Index j, Index i) const { return (origin_[j] - lambda_[i]) + delta_[j]; }
-
-  /// The p_i that has exactly these roots: product of (mu_j - lambda_i) over that of (lambda_j - lambda_i).
-  Complex residue(Index i) const {
-    std::vector<Complex> above, below;
-    for (const Index j : roots_) {
-      above.push_back(distance(j, i));
-      if (!is_real(j)) above.push_back(std::conj(distance(j, mirror(i))));
-    }
-    for (Index j = 0; j < count(); ++j)
-      if (j != i) below.push_back(lambda_[j] - lambda_[i]);
-    Complex product = 1;  // each factor when it brings the product nearer to one, lest it overflow
-    for (size_t a = 0, b = 0; a < above.size() || b < below.size();)
-      if (b == below.size() || (a < above.size() && std::norm(product) <= 1))
-        product *= above[a++];
-      else
-        product /= below[b++];
-    return mirror(i) == i ? Complex(product.real()) : product;
-  }
+  Complex distance(Index j, Index i) const { return (lambda_[j] - lambda_[i]) + delta_[j]; }
 
  private:
   static std::vector<Index> mirrors(const VectorXcd& lambda) {
@@ -142,12 +123,11 @@ class Secular {
           if (j != i) others += p_[j] / (lambda_[j] - lambda_[i]);
         shift = p_[i] / (std::norm(others) < 0.01 ? 0.1 : others);
       }
-      origin_.set(i, lambda_[i]);
       delta_.set(i, shift * turned);
     }
   }
 
-  Sums at(Index j) const { return sums_at(lambda_, p_, origin_[j], delta_[j]); }
+  Sums at(Index j) const { return sums_at(lambda_, p_, lambda_[j], delta_[j]); }
 
   /// Ehrlich, Aberth: Newton on the polynomial with these roots, divided by the other roots.
   void iterate() {
@@ -160,25 +140,11 @@ class Secular {
         const Complex f = 1.0 + s.one;
         done = std::abs(f) <= 4 * epsilon * (1 + s.size);
         if (done) continue;
-        delta_.set(j, delta_[j] - 1.0 / (s.two / f - s.plain - repulsion(origin_, delta_, j)));
+        delta_.set(j, delta_[j] - 1.0 / (s.two / f - s.plain - repulsion(lambda_, delta_, j)));
       }
       if (std::ranges::all_of(found, [](char done) { return done; })) return;
     }
     throw NumericalError("exponential: the eigenvalues of a contact state did not converge");
-  }
-
-  void from_nearest_poles() {
-    for (Index j = 0; j < count(); ++j) {
-      Index nearest = 0;
-      for (Index i = 1; i < count(); ++i)
-        if (std::norm(distance(j, i)) < std::norm(distance(j, nearest))) nearest = i;
-      delta_.set(j, distance(j, nearest));
-      origin_.set(j, lambda_[nearest]);
-      for (int round = 0; round < 2; ++round) {  // Newton, for the digits
-        const Sums s = at(j);
-        delta_.set(j, delta_[j] - (1.0 + s.one) / s.two);
-      }
-    }
   }
 
   /// Roots off the real axis come twice.
@@ -187,7 +153,7 @@ class Secular {
     for (Index j = 0; j < count(); ++j) {
       const Sums s = at(j);
       const double round_off = 1e3 * epsilon * (1 + s.size) / std::abs(s.two), im = root(j).imag();
-      if (std::abs(im) <= std::max(round_off, 1e-12 * std::abs(root(j)))) delta_.im[j] = -origin_.im[j];
+      if (std::abs(im) <= std::max(round_off, 1e-12 * std::abs(root(j)))) delta_.im[j] = -lambda_.im[j];
       if (!is_real(j)) ++(im < 0 ? below : above);
       if (is_real(j) || im > 0) roots_.push_back(j);
     }
@@ -197,7 +163,7 @@ class Secular {
   }
 
   std::vector<Index> mirror_;
-  Numbers lambda_, p_, origin_, delta_;
+  Numbers lambda_, p_, delta_;
   std::vector<Index> roots_;
 };
 
@@ -215,7 +181,7 @@ Spectrum rank_one_spectrum(const VectorXcd& lambda, const VectorXd& w, const Vec
   VectorXcd left(n), right(n);
   for (Index i = 0; i < n; ++i) {
     left[i] = i < m ? v_full[i] : std::conj(left[secular.mirror(i)]);
-    right[i] = i < m ? secular.residue(i) / v_full[i] : std::conj(right[secular.mirror(i)]);
+    right[i] = i < m ? Complex(w[i], w[m + i]) : std::conj(right[secular.mirror(i)]);
   }
   Spectrum s{VectorXcd(all), MatrixXd(2 * m, 2 * all), MatrixXd(2 * all, 2 * m)};
   VectorXcd r(n), l(n);

@@ -228,6 +228,35 @@ TEST(Exponential, AgreesWithBdfFarFromWhereItWasLinearised) {
   EXPECT_EQ(r.events.size(), reference.events.size());
 }
 
+// What is far from linear is as good as asked for, and a coarse answer costs less.
+TEST(Exponential, ErrorIsThatOfTheTolerance) {
+  for (const bool fixed_hub : {false, true}) {
+    const System free = sport_boom(2), fixed(ReducedBody{}, free.appendages(), true);
+    const System& system = fixed_hub ? fixed : free;
+    State s = system.at_rest({pi / 2 - 1.2});
+    if (fixed_hub)
+      s.rate[0] = -30;
+    else
+      s.omega = Vector3d(1, -2, 1.5);
+    const VectorXd y0 = system.pack(s);
+    const Trajectory reference = integrate(system, y0, exponential(1e-11, 0.5));
+    const auto shape = [&](const VectorXd& y) { return y.head(system.layout().p + system.layout().u); };
+    long steps = 0;
+    for (const double tolerance : {1e-3, 1e-5, 1e-7, 1e-9}) {
+      const Trajectory r = integrate(system, y0, exponential(tolerance, 0.5));
+      EXPECT_GT(r.summary.steps, steps) << tolerance;
+      steps = r.summary.steps;
+      VectorXd size = VectorXd::Zero(shape(y0).size()), error = size;
+      for (size_t i = 0; i < r.time.size(); ++i) {
+        size = size.cwiseMax(shape(reference.y[i]).cwiseAbs());
+        error = error.cwiseMax(shape(r.y[i] - reference.y[i]).cwiseAbs());
+      }
+      // Errors of steps add up, more where the hub turns what was wrong.
+      EXPECT_LT(error.cwiseQuotient(size).maxCoeff(), (fixed_hub ? 1.5 : 5) * tolerance) << fixed_hub << tolerance;
+    }
+  }
+}
+
 // A coarse tolerance takes steps that are longer than a contact.
 TEST(Exponential, LongStepsMissNoContact) {
   const System system = sport_boom(2);
@@ -277,7 +306,7 @@ TEST(Exponential, KeepsMomentaAtAnyTolerance) {
       s.velocity = Vector3d(0.1, 0.2, -0.3);
       const Trajectory r = integrate(system, system.pack(s), exponential(tolerance, 2));
       EXPECT_GT(r.events.size(), 4U);
-      // Where a step ends: nothing but the square of the deflection in the inertia is left out of the correction.
+      // Where a step ends: the correction leaves its own square.
       const Balance &first = r.balance.front(), &last = r.balance.back();
       const double scale = system.hub().J0.norm() * (0.1 + omega.norm());
       EXPECT_LT((last.angular_momentum - first.angular_momentum).norm(), 1e-7 * scale);

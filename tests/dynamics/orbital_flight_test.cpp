@@ -97,6 +97,27 @@ TEST_P(EveryMethodInOrbit, RigidBodyLibratesInPitch) {
   EXPECT_LT(r.summary.energy_balance, 1e-7);  // the work of gravity is counted
 }
 
+/// Beside the reference point: the difference of two orbits, each in closed form.
+TEST_P(EveryMethodInOrbit, MassCentreIsOnAnOrbitOfItsOwn) {
+  const Planet planet;
+  const Orbit orbit(circular_orbit(405e3, 0.9), planet);
+  const System system(rigid_body("body", 10, Vector3d::Zero(), Vector3d(3, 2.5, 1).asDiagonal()), {}, false,
+                      OrbitalField{orbit, true});
+  State s = turning_with_orbit(system, {}, {0.1, 0.2, -0.1});
+  s.position = Vector3d(120, -80, 50);
+  s.velocity = Vector3d(0.1, 0.05, -0.2);
+  const OrbitState reference = orbit.at(0);
+  const OrbitState start{reference.position + s.position, reference.velocity + s.velocity};
+  const Trajectory r = integrate(system, system.pack(s), options(GetParam(), 1e-9, 2000, 250));
+  ASSERT_EQ(r.time.size(), 9u);
+  for (size_t i = 0; i < r.time.size(); ++i) {
+    const OrbitState there = kepler(planet.mu, start, r.time[i]), beside = orbit.at(r.time[i]);
+    const State found = system.unpack(r.y[i]);
+    EXPECT_LT((found.position - (there.position - beside.position)).norm(), 1e-6) << i;  // of 400 m
+    EXPECT_LT((found.velocity - (there.velocity - beside.velocity)).norm(), 1e-9) << i;
+  }
+}
+
 /// SPORT at rest on its stops.
 System sport(const std::optional<OrbitalField>& field) {
   const Matrix3d J = (Matrix3d() << 0.134942, 0.00098475, 0, 0.00098475, 0.10477, 0, 0, 0, 0.05858).finished();

@@ -93,6 +93,7 @@ TEST(Secular, PolesMayBeAlike) {
   p.lambda[1] = p.lambda[0] * (1 + 1e-15);
   p.lambda[3] = p.lambda[2] * (1 - 4e-15);
   p.lambda[11] = p.lambda[10] * (1 + 1e-13);
+  p.lambda[5] = p.lambda[4] * (1 + 1e-12), p.lambda[6] = p.lambda[4] * (1 - 3e-12);
   expect_spectrum(p, 1e-11);
 }
 
