@@ -87,6 +87,7 @@ void check_hub(Faults& faults, const Scene& scene) {
     check_inertia(faults, "hub.inertia", hub.inertia, false);
     return;
   }
+  if (scene.bodies.empty()) faults.add("hub.fixed", "is true and there is no body: nothing moves");
   check_not_negative(faults, "hub.mass", hub.mass, " kg");
   check_inertia(faults, "hub.inertia", hub.inertia, true);
   const auto at_rest = [&](const char* path, const Vector3d& v) {

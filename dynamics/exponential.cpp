@@ -14,7 +14,6 @@
 #include <functional>
 #include <limits>
 #include <map>
-#include <optional>
 
 namespace flexboom {
 namespace {
@@ -22,7 +21,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
-using Eigen::Vector4d;
 using Eigen::VectorXd;
 
 constexpr int max_sweeps = 12;
@@ -137,7 +135,7 @@ class ExponentialStepper final : public Stepper {
   }
 
   void interpolate(double t, VectorXd& y) override {
-    MatrixXd Y(y.size(), 1);
+    MatrixXd Y(layout_.size, 1);
     interpolate_all(std::span(&t, 1), Y);
     y = Y;
   }
@@ -161,6 +159,7 @@ class ExponentialStepper final : public Stepper {
   static constexpr int degree = collocation::degree;
   static constexpr int points = collocation::points;
   static constexpr int inner = points - 2;
+
   /// The linear part for the stops that are closed, made when first met.
   LinearPart& linear_part() {
     auto& place = linear_parts_[contact_];
@@ -188,7 +187,7 @@ class ExponentialStepper final : public Stepper {
         try {
           return std::make_unique<LinearPart>(*other, J, layout_.body[hinge]);
         } catch (const NumericalError&) {
-          // The block alone has no full set of eigenvectors; all of L may have.
+          // The block alone has no full set of eigenvectors, or two in one place; all of L may do.
         }
       }
     return std::make_unique<LinearPart>(std::move(J), system_.fixed_hub() ? -1 : layout_.p, p);

@@ -38,6 +38,7 @@ HubMotion::HubMotion(const System& system, const ErrorScale& scale, Workspace& w
     : system_(system), layout_(system.layout()), scale_(scale), work_(work) {}
 
 void HubMotion::start(const VectorXd& y) {
+  power_coefficients_.setZero(), turning_coefficients_.setZero(), gravity_coefficients_.setZero();
   dissipated_ = y[layout_.dissipated()];
   if (system_.fixed_hub()) return;
   attitude_ = y.segment<4>(layout_.attitude());

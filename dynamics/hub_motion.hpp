@@ -23,7 +23,7 @@ class HubMotion {
   /// At point j: the power that is lost [W], and gravity at the mass centre at the time t [s] and y.
   void take(int j, double power, double t, const Eigen::VectorXd& y);
 
-  /// What was taken but at the start.
+  /// Gravity is everywhere as at the start.
   void forget();
 
   /// By p and u of the points, and what was taken at them.
@@ -32,7 +32,8 @@ class HubMotion {
   /// Sets attitude and dissipated energy at a fraction c of the step, `at` its functions there.
   void turn(const CollocatedStep&, const GridPoint& at, double c, Eigen::Ref<Eigen::VectorXd> y);
 
-  /// Sets position and velocity there, by all the rest of y: forces between the bodies do not move the mass centre.
+  /// Sets position and velocity there, by p, u and attitude of y (after `turn`): forces between the bodies do not move
+  /// the mass centre.
   void place(const CollocatedStep&, double c, Eigen::Ref<Eigen::VectorXd> y) const;
 
   /// Of the step, in units of the one allowed; z_error: of z at its end, left: time to the end of the flight [s].
@@ -40,7 +41,7 @@ class HubMotion {
 
   /// What only the outside could change is as it was at the start: angular momentum. A wrong attitude is turned, a
   /// wrong rate is made faster or slower, each by its size; where there is a momentum, mostly the attitude, for that
-  /// acts back on nothing. Returns what it added to omega.
+  /// acts back on nothing. Returns what it added to omega (hub axes) [rad/s].
   Eigen::Vector3d keep_momentum(Eigen::VectorXd& y) const;
 
  private:

@@ -237,7 +237,10 @@ class Flight {
   void write_outputs() {
     for (outputs_within_step(); !times_.empty() && !stopped(); outputs_within_step()) {
       stepper_->interpolate_all(times_, samples_);
-      for (size_t i = 0; i < times_.size(); ++i) record(times_[i], samples_.col(static_cast<Eigen::Index>(i)));
+      for (size_t i = 0; i < times_.size(); ++i) {
+        if (options_.progress && result_.time.size() % 1024 == 0) options_.progress(times_[i], options_.duration);
+        record(times_[i], samples_.col(static_cast<Eigen::Index>(i)));
+      }
     }
     if (outputs_.after(result_.time.size()) == t_ && !stopped()) record(t_, y_);
   }
@@ -253,7 +256,6 @@ class Flight {
   }
 
   void record(double t, const Eigen::Ref<const VectorXd>& y) {
-    if (options_.progress && result_.time.size() % 1024 == 0) options_.progress(t, options_.duration);
     result_.time.push_back(t);
     result_.y.emplace_back(y);
     if (!system_.fixed_hub()) {

@@ -3,11 +3,8 @@
 #include "dynamics/phi.hpp"
 #include "fem/lanes.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <complex>
 #include <utility>
-#include <vector>
 
 namespace flexboom {
 

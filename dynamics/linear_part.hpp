@@ -26,7 +26,7 @@ struct LinearPart : Spectrum {
 
   /// Of another L that differs in one column, as by a stop. What the difference hardly couples stays as it is (the
   /// remainder takes that), so most eigenvectors of many modes are those of `other`.
-  /// @throws NumericalError when the block that is coupled has no full set of eigenvectors.
+  /// @throws NumericalError when the block that is coupled has no full set of eigenvectors, or they are not found.
   LinearPart(const LinearPart& other, Eigen::MatrixXd L, int column);
 
   Eigen::Index size() const { return to_modes.rows(); }

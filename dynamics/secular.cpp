@@ -140,7 +140,9 @@ class Secular {
         const Complex f = 1.0 + s.one;
         done = std::abs(f) <= 4 * epsilon * (1 + s.size);
         if (done) continue;
-        delta_.set(j, delta_[j] - 1.0 / (s.two / f - s.plain - repulsion(lambda_, delta_, j)));
+        const Complex next = delta_[j] - 1.0 / (s.two / f - s.plain - repulsion(lambda_, delta_, j));
+        if (!std::isfinite(std::norm(next))) throw NumericalError("exponential: two modes have one eigenvalue");
+        delta_.set(j, next);
       }
       if (std::ranges::all_of(found, [](char done) { return done; })) return;
     }

@@ -17,7 +17,7 @@ Spectrum spectrum_of(Eigen::MatrixXd L);
 
 /// Of L + d e^T, e the unit vector of `column`, from the spectrum of L. What the difference hardly couples stays as it
 /// is, so most eigenvectors of many modes are those of L.
-/// @throws NumericalError when the block that is coupled has no full set of eigenvectors.
+/// @throws NumericalError when the block that is coupled has no full set of eigenvectors, or they are not found.
 Spectrum with_column(const Spectrum&, const Eigen::VectorXd& d, int column);
 
 }  // namespace flexboom

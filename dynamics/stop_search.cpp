@@ -61,16 +61,22 @@ std::complex<double> StopSearch::share_of(const CollocatedStep& step, Index mode
 StopSearch::Ripple StopSearch::ripple(const CollocatedStep& step, int gap, int point) {
   take_rates(step, gap, point);
   const double fastest = sizes_.maxCoeff();
+  double widest = 0;
   fast_.clear();
-  Ripple r;
   for (Index k = 0; k < sizes_.size(); ++k) {
-    if (sizes_[k] < 4e-4 * fastest) continue;  // less than a fiftieth of the largest rate
     const std::complex<double> rate = step.linear->lambda[k] * step.length;
     if (std::norm(rate) < 4) continue;  // slow
     fast_.push_back({k, rate, share_of(step, k)});
-    if (rate.imag() < 2) continue;
-    r.turn = std::max(r.turn, rate.imag());
-    r.amplitude += std::abs(fast_.back().share);
+    widest = std::max(widest, std::norm(fast_.back().share));
+  }
+  // Less than a fiftieth of the largest rate and of the widest is nothing.
+  std::erase_if(fast_,
+                [&](const Fast& f) { return sizes_[f.mode] < 4e-4 * fastest && std::norm(f.share) < 4e-4 * widest; });
+  Ripple r;
+  for (const Fast& f : fast_) {
+    if (f.rate.imag() < 2) continue;
+    r.turn = std::max(r.turn, f.rate.imag());
+    r.amplitude += std::abs(f.share);
   }
   return r;
 }

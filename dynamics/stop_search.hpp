@@ -16,7 +16,7 @@ struct CollocatedStep {
   LinearPart* linear = nullptr;
   const Grid* grid = nullptr;
   double start = 0, length = 0;  // [s]
-  Eigen::MatrixXd X, Z, N;       // x (ends: all; inner points: gaps, rates), its coefficients, their remainders
+  Eigen::MatrixXd X, Z, N;       // x (inner points: omega, gaps and rates alone), its coefficients, their remainders
   Eigen::MatrixXd M;             // of the remainder, see LinearPart::combine
 };
 

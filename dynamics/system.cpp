@@ -71,6 +71,7 @@ void check_hinge_inertia(const Appendage& a) {
 System::System(ReducedBody hub, std::vector<Appendage> appendages, bool fixed_hub, std::optional<OrbitalField> field)
     : impl_(std::make_unique<Impl>()) {
   Impl& s = *impl_;
+  require(!(fixed_hub && appendages.empty()), "the hub is fixed and nothing hangs on it: nothing moves");
   require(!(fixed_hub && field), "a hub that is fixed in inertial space is in no orbit: leave out one of the two");
   s.field = std::move(field);
   s.fixed_hub = fixed_hub;

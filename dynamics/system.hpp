@@ -35,14 +35,14 @@ struct State {
   double dissipated = 0;  // energy lost since the start; in a field of gravity less the work of gravity [J]
 };
 
-/// Energies [J] and momenta (inertial axes, about the inertial origin).
+/// Energies [J] and momenta (inertial axes).
 struct Balance {
   double kinetic = 0;
   double elastic = 0;                                          // booms, hinge springs and stops
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero();          // [kg m/s]
   Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();  // about the system's mass centre [N m s]
   double momentum_scale = 0;  // sum of the bodies' |momentum|, and of all with the hub: what a drift is relative to
-  double angular_momentum_scale = 0;
+  double angular_momentum_scale = 0;  // of that about each body's own origin, the hub's origin at rest
 };
 
 /// All bodies as one, seen from the hub's origin, hub axes.
@@ -84,7 +84,7 @@ class System {
  public:
   /// In a `field`, positions are relative to its reference point, and so is the gravity that all bodies feel.
   /// @throws InputError when a body is invalid, a hinge's directions are not orthonormal, a mass matrix is singular, or
-  /// a fixed hub is in a field.
+  /// a fixed hub is in a field or alone.
   System(ReducedBody hub, std::vector<Appendage> appendages, bool fixed_hub = false,
          std::optional<OrbitalField> field = {});
   ~System();
@@ -133,6 +133,7 @@ class System {
     return y[l.u_begin() + l.base + l.body[static_cast<size_t>(appendage)]];
   }
 
+  /// Energies and momenta of hub and bodies; without the work of gravity.
   Balance balance(const Eigen::Ref<const Eigen::VectorXd>& y, Workspace&) const;
 
   /// By p and u alone.

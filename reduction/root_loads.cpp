@@ -15,13 +15,12 @@ using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
 using Eigen::MatrixXd;
-using Eigen::Ref;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 /// Coordinates, or zeros for none.
 VectorXd coordinates(const ReducedBody& body, const VectorXd& q, const char* name) {
-  if (q.size() != 0 && q.size() != body.n())  // no text where it fits: balances ask at every output
+  if (q.size() != 0 && q.size() != body.n())
     throw InputError(
         fmt::format("body \"{}\": motion has {} values of {}, must have {}", body.name, q.size(), name, body.n()));
   return q.size() > 0 ? q : VectorXd::Zero(body.n());
@@ -52,30 +51,13 @@ DeformedInertia deformed_inertia(const ReducedBody& body, const VectorXd& q) {
 }
 
 BodyMomenta momenta(const ReducedBody& body, const BodyMotion& motion) {
-  return momenta(body, motion.v, motion.omega, coordinates(body, motion.q, "q"),
-                 coordinates(body, motion.q_dot, "q_dot"));
-}
-
-BodyMomenta momenta(const ReducedBody& body, const Vector3d& v, const Vector3d& w, const Ref<const VectorXd>& q,
-                    const Ref<const VectorXd>& q_dot) {
-  Vector3d mc = body.mc0, slid = Vector3d::Zero(), turned = Vector3d::Zero();  // Ct q_dot, Cr q_dot
-  Matrix3d J = body.J0;
-  double elastic = 0;
-  if (body.n() > 0) {
-    mc += body.Ct.lazyProduct(q);
-    slid = body.Ct.lazyProduct(q_dot);
-    turned = body.Cr0.lazyProduct(q_dot);
-    elastic = q_dot.dot(body.Me.lazyProduct(q_dot));
-  }
-  for (Index k = 0; k < body.n(); ++k) {
-    const auto kk = static_cast<size_t>(k);
-    Matrix3d slope = body.J1[kk] + q(k) * body.J2[kk][kk];
-    for (Index l = 0; l < k; ++l) slope += 2 * q(l) * body.J2[kk][static_cast<size_t>(l)];  // symmetric in k and l
-    J += q(k) * slope;
-    turned += q(k) * body.Cr1[kk].lazyProduct(q_dot);
-  }
-  // P = m v + w x mc + Ct q_dot, H = mc x v + J w + Cr q_dot, 2 T = v . P + w . H + q_dot . (Ct^T v + Cr^T w + Me
-  // q_dot)
+  const Vector3d &v = motion.v, &w = motion.omega;
+  const VectorXd q = coordinates(body, motion.q, "q"), q_dot = coordinates(body, motion.q_dot, "q_dot");
+  const auto& [mc, J, Cr] = deformed_inertia(body, q);
+  const Vector3d slid = body.Ct * q_dot, turned = Cr * q_dot;
+  const double elastic = q_dot.dot(body.Me * q_dot);
+  // P = m v + w x mc + Ct q_dot, H = mc x v + J w + Cr q_dot,
+  // 2 T = v . P + w . H + q_dot . (Ct^T v + Cr^T w + Me q_dot)
   BodyMomenta r;
   r.linear = body.m * v + w.cross(mc) + slid;
   r.angular = mc.cross(v) + J * w + turned;

@@ -34,9 +34,6 @@ struct BodyMomenta {
 };
 /// @throws InputError when q or q_dot is neither empty nor of size n.
 BodyMomenta momenta(const ReducedBody&, const BodyMotion&);
-/// Of coordinates of size n, without an allocation.
-BodyMomenta momenta(const ReducedBody&, const Eigen::Vector3d& v, const Eigen::Vector3d& omega,
-                    const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Ref<const Eigen::VectorXd>& q_dot);
 
 /// A force [N] and a torque [N m] on a marker, BRF axes.
 struct MarkerLoad {

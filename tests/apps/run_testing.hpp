@@ -6,6 +6,7 @@
 #include "fem/check.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -23,11 +24,14 @@ inline Scene scene_named(const std::string& name) {
   return scene;
 }
 
-/// The text as a file, read as a state.
+/// The text as a file, read as a state. Tests run side by side: the file is this process's own.
 inline SavedState state_of(const std::string& text) {
-  const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "state.toml";
-  std::ofstream(file) << text;
-  return SavedState::read(file);
+  const std::filesystem::path folder =
+      std::filesystem::path(::testing::TempDir()) / ("state." + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  const std::shared_ptr<void> at_end(nullptr, [&](void*) { std::filesystem::remove_all(folder); });
+  std::ofstream(folder / "state.toml") << text;
+  return SavedState::read(folder / "state.toml");
 }
 
 /// The scene from where a run ended.

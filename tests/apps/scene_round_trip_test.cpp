@@ -167,8 +167,20 @@ TEST(Scene, HubAloneIsAScene) {
 }
 
 TEST(Scene, FixedHubNeedsNoMass) {
-  const Scene scene =
-      parse_scene("format = \"flexboom-scene-1\"\nname = \"hub\"\nhub = { fixed = true }\n", "hub.toml");
+  const Scene scene = parse_scene(R"(format = "flexboom-scene-1"
+name = "hub"
+hub = { fixed = true }
+[[bodies]]
+name = "rod"
+segments = [{ shape = "round-bar", diameter = 0.005, length = 0.295, material = { E = 67e9, nu = 0.33, rho = 2840 } }]
+[[hinges]]
+body = "rod"
+point = [0, 0, 0]
+stowed = [0, 1, 0]
+outward = [1, 0, 0]
+P1 = 0.35
+)",
+                                  "hub.toml");
   EXPECT_TRUE(scene.hub.fixed);
   expect_round_trip(scene);
 }

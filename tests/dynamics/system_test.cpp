@@ -274,6 +274,7 @@ TEST(System, SaysWhatIsWrongWithItsParts) {
   negative.hinge.mechanism.damping = -1;
   EXPECT_THROW(System(hub, {negative}), InputError);
   EXPECT_THROW(System(a.body, {a}), InputError);  // a hub with elastic coordinates
+  EXPECT_THROW(System(hub, {}, true), InputError);
 }
 
 }  // namespace
