@@ -185,7 +185,7 @@ Spectrum rank_one_spectrum(const VectorXcd& lambda, const VectorXd& w, const Vec
     left[i] = i < m ? v_full[i] : std::conj(left[secular.mirror(i)]);
     right[i] = i < m ? Complex(w[i], w[m + i]) : std::conj(right[secular.mirror(i)]);
   }
-  Spectrum s{VectorXcd(all), MatrixXd(2 * m, 2 * all), MatrixXd(2 * all, 2 * m)};
+  Spectrum s{VectorXcd(all), MatrixXd::Zero(2 * m, 2 * all), MatrixXd::Zero(2 * all, 2 * m)};
   VectorXcd r(n), l(n);
   for (Index k = 0; k < all; ++k) {
     const Index j = secular.roots()[static_cast<size_t>(k)];
@@ -202,24 +202,18 @@ Spectrum rank_one_spectrum(const VectorXcd& lambda, const VectorXd& w, const Vec
     s.lambda[k] = is_real ? Complex(secular.root(j).real()) : secular.root(j);
     const double twice = is_real ? 1 : 2;
     for (Index i = 0; i < m; ++i) {
-      const Index mirror = secular.mirror(i);
-      const Complex r_other = mirror == i ? 0 : r[mirror], l_other = mirror == i ? 0 : l[mirror];
-      const double half = mirror == i ? 1 : 0.5;  // of a pair s.from_modes has twice the eigenvector
+      const bool pair = secular.mirror(i) != i;
+      const Complex r_other = pair ? r[secular.mirror(i)] : 0, l_other = pair ? l[secular.mirror(i)] : 0;
+      const double half = pair ? 0.5 : 1;  // of a pair s.from_modes has twice the eigenvector
       const Complex plus = twice * half * (r[i] + r_other), minus = twice * half * (r[i] - r_other);
       s.from_modes(i, k) = plus.real();
-      s.from_modes(m + i, k) = minus.imag();
-      s.from_modes(i, all + k) = is_real ? 0 : -plus.imag();
-      s.from_modes(m + i, all + k) = is_real ? 0 : minus.real();
       s.to_modes(k, i) = (l[i] + l_other).real();
+      if (!is_real) s.from_modes(i, all + k) = -plus.imag(), s.to_modes(all + k, i) = (l[i] + l_other).imag();
+      if (!pair) continue;
+      s.from_modes(m + i, k) = minus.imag();
       s.to_modes(k, m + i) = -(l[i] - l_other).imag();
-      s.to_modes(all + k, i) = is_real ? 0 : (l[i] + l_other).imag();
-      s.to_modes(all + k, m + i) = is_real ? 0 : (l[i] - l_other).real();
+      if (!is_real) s.from_modes(m + i, all + k) = minus.real(), s.to_modes(all + k, m + i) = (l[i] - l_other).real();
     }
-    for (Index i = 0; i < m; ++i)
-      if (secular.mirror(i) == i) {  // a real eigenvalue has no imaginary part
-        s.from_modes(m + i, k) = s.from_modes(m + i, all + k) = 0;
-        s.to_modes(k, m + i) = s.to_modes(all + k, m + i) = 0;
-      }
   }
   VectorXd z = VectorXd::Ones(2 * m);
   for (Index i = 0; i < m; ++i)
