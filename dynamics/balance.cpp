@@ -3,8 +3,6 @@
 #include "dynamics/rotation.hpp"
 #include "dynamics/system_impl.hpp"
 
-#include <algorithm>
-
 namespace flexboom {
 
 using Eigen::Matrix3d;
@@ -14,14 +12,13 @@ using spatial::eigen;
 
 namespace {
 
-double hinge_energy(const HingeMechanism& m, double gap) {
-  const double stretch = gap + m.threshold - m.rest, depth = std::max(0.0, gap);
-  return 0.5 * m.stiffness * stretch * stretch + 0.5 * m.stop_stiffness * depth * depth;
-}
-
 FLEXBOOM_INNER_LOOP
 equations::Together together(const equations::Model& model, const double* p, const double* u, Workspace& w) {
   return equations::together(model, p, u, w.scratch);
+}
+
+Vector3d about_mass_centre(const equations::Together& all) {
+  return eigen(all.angular_momentum) - eigen(all.first_moment).cross(eigen(all.momentum)) / all.m;
 }
 
 /// What |r|^2 I - r r^T is for all mass at r.
@@ -32,32 +29,28 @@ Matrix3d at(const Vector3d& r, double m) { return m * (r.squaredNorm() * Matrix3
 Balance System::balance(const Eigen::Ref<const VectorXd>& y, Workspace& w) const {
   const Layout& l = layout();
   const equations::Together all = together(impl_->model, y.data(), y.data() + l.u_begin(), w);
-  Balance r;
-  r.kinetic = all.kinetic;
-  r.elastic = all.strain;
-  for (size_t i = 0; i < l.body.size(); ++i) r.elastic += hinge_energy(appendages()[i].hinge.mechanism, y[l.body[i]]);
-  r.momentum_scale = all.momentum_scale;
-  r.angular_momentum_scale = all.angular_momentum_scale;
-  const Vector3d P = eigen(all.momentum), H = eigen(all.angular_momentum), moment = eigen(all.first_moment);
-  const Vector3d about_mass_centre = H - moment.cross(P) / all.m;
-  if (fixed_hub()) {
-    r.momentum = P;
-    r.angular_momentum = about_mass_centre;
-    return r;
+  Matrix3d A = Matrix3d::Identity();
+  Vector3d V = Vector3d::Zero();
+  if (!fixed_hub()) {
+    A = rotation_matrix(y.segment<4>(l.attitude()));
+    V = y.segment<3>(l.velocity());
   }
-  const Matrix3d A = rotation_matrix(y.segment<4>(l.attitude()));
-  const Vector3d V = y.segment<3>(l.velocity());
-  r.momentum = all.m * V + A * P;
-  r.momentum_scale += all.m * V.norm();
-  r.kinetic += V.dot(A * P) + 0.5 * all.m * V.squaredNorm();
-  r.angular_momentum = A * about_mass_centre;
+  const Vector3d P = A * eigen(all.momentum);
+  Balance r;
+  r.kinetic = all.kinetic + V.dot(P) + 0.5 * all.m * V.squaredNorm();
+  r.elastic = all.strain;
+  for (size_t i = 0; i < l.body.size(); ++i) r.elastic += energy(appendages()[i].hinge.mechanism, y[l.body[i]]);
+  r.momentum = all.m * V + P;
+  r.momentum_scale = all.momentum_scale + all.m * V.norm();
+  r.angular_momentum = A * about_mass_centre(all);
+  r.angular_momentum_scale = all.angular_momentum_scale;
   return r;
 }
 
 Whole System::whole(const Eigen::Ref<const VectorXd>& y, Workspace& w) const {
   const equations::Together all = together(impl_->model, y.data(), y.data() + layout().u_begin(), w);
-  const Vector3d c = eigen(all.first_moment) / all.m, P = eigen(all.momentum);
-  return {c, P / all.m, eigen(all.inertia) - at(c, all.m), eigen(all.angular_momentum) - c.cross(P)};
+  const Vector3d c = eigen(all.first_moment) / all.m;
+  return {c, eigen(all.momentum) / all.m, eigen(all.inertia) - at(c, all.m), about_mass_centre(all)};
 }
 
 }  // namespace flexboom

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <numbers>
 #include <string>
 
@@ -18,6 +19,12 @@ struct HingeMechanism {
   double stop_stiffness = 0;                // P3 [N m/rad]; 0: no stop
   double threshold = std::numbers::pi / 2;  // Thr [rad]
 };
+
+/// Energy [J] in spring and stop; gap: Theta - threshold [rad].
+inline double energy(const HingeMechanism& m, double gap) {
+  const double stretch = gap + m.threshold - m.rest, depth = std::max(0.0, gap);
+  return 0.5 * m.stiffness * stretch * stretch + 0.5 * m.stop_stiffness * depth * depth;
+}
 
 /// Hinge between the hub and a boom. At angle Theta the boom's x axis is cos(Theta) stowed + sin(Theta) outward, its y
 /// axis the derivative of that (positive deflection), its z axis the hinge axis; the boom's BRF origin is at `point`.

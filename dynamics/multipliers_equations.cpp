@@ -284,9 +284,7 @@ double Equations::potential(const double* y, const JointMemory& memory) const {
   double energy = 0;
   for (size_t i = 0; i < joints_.size(); ++i) {
     if (!joints_[i].mechanism) continue;
-    const HingeMechanism& m = scene_.joints[i].mechanism;
-    const double depth = gap(i, y, memory.near[i]).value, stretch = depth + (m.threshold - m.rest);
-    energy += 0.5 * m.stiffness * stretch * stretch + 0.5 * m.stop_stiffness * std::pow(std::max(0.0, depth), 2);
+    energy += flexboom::energy(scene_.joints[i].mechanism, gap(i, y, memory.near[i]).value);
   }
   for (size_t i = 0; i < scene_.springs.size(); ++i) {
     const JointData& j = prepared_.springs[i];

@@ -32,17 +32,11 @@ TreeWorkspaceHandle evaluated(const Tree& system, const tree::Model& model, doub
 
 std::vector<char> open_stops(const Tree& system) { return std::vector<char>(system.scene().joints.size(), 0); }
 
-double mechanism_energy(const HingeMechanism& m, double coordinate) {
-  const double stretch = coordinate - m.rest, depth = std::max(0.0, coordinate - m.threshold);
-  return 0.5 * m.stiffness * stretch * stretch + 0.5 * m.stop_stiffness * depth * depth;
-}
-
 double elastic_energy(const tree::Link& link, const Joint& joint, const ReducedBody& body, const VectorXd& y) {
-  double energy = 0;
-  if (link.kind == JointKind::hinge || link.kind == JointKind::slider)
-    energy += mechanism_energy(joint.mechanism, y[link.scalar] + link.threshold);
+  const bool has_mechanism = link.kind == JointKind::hinge || link.kind == JointKind::slider;
+  const double in_joint = has_mechanism ? energy(joint.mechanism, y[link.scalar]) : 0;
   const auto q = y.segment(link.q, link.body.n);
-  return link.body.n ? energy + 0.5 * q.dot(body.Ke * q) : energy;
+  return link.body.n ? in_joint + 0.5 * q.dot(body.Ke * q) : in_joint;
 }
 
 /// Sums over the bodies, about the inertial origin.
@@ -62,7 +56,7 @@ struct Totals {
       P += q_dot[k] * Ct;
       H += q_dot[k] * s.modes.Cr[k];
       double p = dot(Ct, v) + dot(s.modes.Cr[k], w);
-      for (size_t l = 0; l < n; ++l) p += link.Me[k * n + l] * q_dot[l];
+      for (size_t l = 0; l < n; ++l) p += link.body.Me[k * n + l] * q_dot[l];
       modal += q_dot[k] * p;
     }
     balance.kinetic += 0.5 * (dot(v, P) + dot(w, H) + modal);

@@ -18,7 +18,7 @@ void condense_held(const Link& link, LinkScratch<T>& s) {
   for (size_t k = 0; k < n; ++k) {
     s.C[k] = {link.second_order ? s.Ct[k] : equations::lift<T>(b.Ct[k]), s.modes.Cr[k]};
     s.v[k] = s.modes.b[k];
-    for (size_t l = 0; l < n; ++l) s.M[k * n + l] = T(link.Me[k * n + l]);
+    for (size_t l = 0; l < n; ++l) s.M[k * n + l] = T(b.Me[k * n + l]);
   }
   for (size_t i = 0; i < s.hung.size(); ++i) {
     const HubSystem<T>& W = s.hung[i];

@@ -182,8 +182,6 @@ Link make_link(const Multibody& scene, int index, int joint_index, Stiffening st
   set_shapes(body, joint.b.marker, to_link, link.second_order, link.b);
   link.b.axes = mat3(Matrix3d::Identity());
   pack_invariants(own, link.body);
-  for (Eigen::Index k = 0; k < own.n(); ++k)
-    for (Eigen::Index l = 0; l < own.n(); ++l) link.Me.push_back(own.Me(k, l));
   set_mechanism(joint, link);
   return link;
 }

@@ -28,7 +28,6 @@ struct PlaceModel {
 /// A body with the joint that carries it. Its frame is place b, undeformed.
 struct Link {
   equations::Body body;
-  std::vector<double> Me;                // n x n
   std::vector<Term> Ct_slope, Cr_slope;  // with geometric stiffness: Ct_k gains this q_l, Cr_k too
   bool second_order = false;
 
