@@ -16,7 +16,7 @@ using nlohmann::ordered_json;
 
 constexpr const char* heading = "{:<16} {:<16} {:>9} {:>9} {:>8} {:>7} {:>9} {:>8} {:>9} {:>10}\n";
 
-void print_heading() {
+void print_modes_heading() {
   fmt::print("Boom 4 of SPORT, clamped, modes 1 to 10, one thread, whole processes; error against the 3D reference\n");
   fmt::print(fmt::runtime(heading), "element", "mesh", "unknowns", "error", "s", "MB", "ccx s", "ccx MB", "ccx/here",
              "difference");
@@ -86,7 +86,7 @@ ordered_json json_of(const std::vector<ModesBench>& rows) {
 int bench_modes_command(const BenchArguments& a, const CommonOptions& common) {
   const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results/bench_modes") : common.out;
   const bool table = !common.json && !common.quiet;
-  if (table) print_heading();
+  if (table) print_modes_heading();
   if (program_on_path("ccx").empty() && !common.quiet)
     print_note("note: no program ccx on the PATH, so nothing is compared with CalculiX (Debian: calculix-ccx)");
   const std::vector<ModesBench> rows = bench_modes(folder, a.longest, [&](const ModesBench& row) {

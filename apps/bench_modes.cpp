@@ -20,7 +20,7 @@ namespace {
 constexpr int modes = 10;
 
 /// Boom 4 of SPORT (Mantovani et al. 2020, Table 1): solid round bar of aluminium.
-BeamGeometry boom4() {
+BeamGeometry boom4_geometry() {
   BeamGeometry boom;
   boom.segments = {{RoundBar{0.01}, RoundBar{0.01}, 0.302, Material{67e9, 0.33, 2840}, 0}};
   return boom;
@@ -107,16 +107,16 @@ Mesh uniform_mesh(const std::string& element, const Rung& rung) {
   options.grading.long_elements = rung.along;
   options.grading.end_layers = 0;
   options.grading.corner_levels = 0;
-  Mesh mesh = make_solid_mesh(boom4(), options);
+  Mesh mesh = make_solid_mesh(boom4_geometry(), options);
   for (const int node : node_set(mesh, "root")) {
     mesh.supports.push_back({node, {true, true, true, false, false, false}});
   }
   return mesh;
 }
 
-class Bench {
+class ModesLadder {
  public:
-  Bench(std::filesystem::path folder, double longest, const std::function<void(const ModesBench&)>& seen)
+  ModesLadder(std::filesystem::path folder, double longest, const std::function<void(const ModesBench&)>& seen)
       : folder_(std::move(folder)), longest_(longest), seen_(seen) {}
 
   void graded_hexahedra() {
@@ -181,8 +181,8 @@ class Bench {
 }  // namespace
 
 std::vector<double> boom4_reference_hz() {
-  const Material m = boom4().segments.front().material;
-  const double torsion = std::sqrt(m.shear_modulus() / m.rho) / (4 * boom4().length());
+  const Material m = boom4_geometry().segments.front().material;
+  const double torsion = std::sqrt(m.shear_modulus() / m.rho) / (4 * boom4_geometry().length());
   return {74.57570632384,  74.57570632384, 465.60850721105, 465.60850721105, 1296.0223559708,
           1296.0223559708, torsion,        2518.2917811872, 2518.2917811872, 4024.8984845735};
 }
@@ -190,7 +190,7 @@ std::vector<double> boom4_reference_hz() {
 std::vector<ModesBench> bench_modes(const std::filesystem::path& folder, double longest,
                                     const std::function<void(const ModesBench&)>& seen) {
   std::filesystem::create_directories(folder);
-  Bench bench(std::filesystem::absolute(folder), longest, seen);
+  ModesLadder bench(std::filesystem::absolute(folder), longest, seen);
   bench.graded_hexahedra();
   bench.beams();
   for (const Ladder& ladder : ladders()) bench.uniform(ladder);

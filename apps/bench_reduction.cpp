@@ -220,9 +220,9 @@ ReducedBody reference_of(const Mesh& mesh, int threads) {
 
 // ---- the ladders ----
 
-class Bench {
+class ReductionLadder {
  public:
-  Bench(double longest, int threads, const std::function<void(const ReductionBench&)>& seen)
+  ReductionLadder(double longest, int threads, const std::function<void(const ReductionBench&)>& seen)
       : longest_(longest), threads_(threads), seen_(seen) {}
 
   void solids() {
@@ -341,7 +341,7 @@ class Bench {
 }  // namespace
 
 ReductionBenches bench_reduction(double longest, int threads, const std::function<void(const ReductionBench&)>& seen) {
-  Bench bench(longest, threads, seen);
+  ReductionLadder bench(longest, threads, seen);
   bench.beams();
   bench.solids();
   set_blas_threads(threads);

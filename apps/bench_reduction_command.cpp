@@ -17,26 +17,26 @@ using nlohmann::ordered_json;
 
 // ---- the table ----
 
-constexpr const char* columns =
+constexpr const char* reduction_columns =
     "{:<8} {:<14} {:>8} {:>5} {:>7} {:>8} {:>8} {:>5} {:>8} {:>5} {:>6} {:>9} {:>9} {:>9}\n";
 
-void print_heading() {
+void print_reduction_heading() {
   fmt::print(
       "Boom 4 of SPORT, clamped. Seconds of the eigen-solve, of its invariants (reduce) and of the geometric\n"
       "stiffness of 18 loads (Kg, factor given), and their share of the eigen-solve. What the modes lack of the full\n"
       "model: static tip compliance, lateral effective mass, first frequency on a free hinge.\n");
-  fmt::print(fmt::runtime(columns), "element", "mesh", "unknowns", "modes", "threads", "eigen s", "reduce s", "%",
-             "Kg s", "%", "MB", "tip", "mass", "hinge");
+  fmt::print(fmt::runtime(reduction_columns), "element", "mesh", "unknowns", "modes", "threads", "eigen s", "reduce s",
+             "%", "Kg s", "%", "MB", "tip", "mass", "hinge");
 }
 
 void print_row(const ReductionBench& r) {
   const auto seconds = [](double s) { return fmt::format("{:.3f}", s); };
   const auto share = [&r](double s) { return fmt::format("{:.0f}", 100 * s / r.modes_seconds); };
   const auto error = [](double e) { return fmt::format("{:.1e}", e); };
-  fmt::print(fmt::runtime(columns), r.family, r.model, r.unknowns, r.modes, r.threads, seconds(r.modes_seconds),
-             seconds(r.reduce_seconds), share(r.reduce_seconds), seconds(r.stiffening_seconds),
-             share(r.stiffening_seconds), fmt::format("{:.0f}", r.memory_mb), error(r.compliance_error),
-             error(r.mass_missing), error(r.hinge_error));
+  fmt::print(fmt::runtime(reduction_columns), r.family, r.model, r.unknowns, r.modes, r.threads,
+             seconds(r.modes_seconds), seconds(r.reduce_seconds), share(r.reduce_seconds),
+             seconds(r.stiffening_seconds), share(r.stiffening_seconds), fmt::format("{:.0f}", r.memory_mb),
+             error(r.compliance_error), error(r.mass_missing), error(r.hinge_error));
   std::fflush(stdout);
 }
 
@@ -177,7 +177,7 @@ int bench_reduction_command(const BenchArguments& a, const CommonOptions& common
       common.out.empty() ? std::filesystem::path("results/bench_reduction") : common.out;
   const bool table = !common.json && !common.quiet;
   std::filesystem::create_directories(folder);
-  if (table) print_heading();
+  if (table) print_reduction_heading();
   const ReductionBenches bench = bench_reduction(a.longest, common.threads, [table](const ReductionBench& row) {
     if (table) print_row(row);
   });

@@ -59,9 +59,10 @@ std::vector<std::string> methods_of(const Scene& scene) {
   return names;
 }
 
-class Bench {
+class TransientLadder {
  public:
-  Bench(double longest, const std::function<void(const TransientBench&)>& seen) : longest_(longest), seen_(seen) {}
+  TransientLadder(double longest, const std::function<void(const TransientBench&)>& seen)
+      : longest_(longest), seen_(seen) {}
 
   std::vector<TransientBench> run(const std::vector<std::string>& scenes) {
     for (const Case& c : cases(scenes)) {
@@ -136,7 +137,7 @@ class Bench {
 
 std::vector<TransientBench> bench_transient(const std::vector<std::string>& scenes, double longest,
                                             const std::function<void(const TransientBench&)>& seen) {
-  return Bench(longest, seen).run(scenes);
+  return TransientLadder(longest, seen).run(scenes);
 }
 
 }  // namespace flexboom

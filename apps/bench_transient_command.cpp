@@ -13,20 +13,20 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr const char* columns = "{:<16} {:<12} {:>9} {:>9} {:>10} {:>9} {:>9} {:>9} {:>8} {:>10} {:>7}\n";
+constexpr const char* transient_columns = "{:<16} {:<12} {:>9} {:>9} {:>10} {:>9} {:>9} {:>9} {:>8} {:>10} {:>7}\n";
 
-void print_heading() {
+void print_transient_heading() {
   fmt::print(
       "Seconds of integration, times real time, and the errors reached: largest of all outputs and of the hub's\n"
       "rotation, each over its largest value; reference: another method at 1e-11\n");
-  fmt::print(fmt::runtime(columns), "scene", "method", "tolerance", "s", "real time", "outputs", "hub", "energy",
-             "steps", "evaluations", "events");
+  fmt::print(fmt::runtime(transient_columns), "scene", "method", "tolerance", "s", "real time", "outputs", "hub",
+             "energy", "steps", "evaluations", "events");
 }
 
 void print_row(const TransientBench& r) {
   const auto number = [](double v) { return fmt::format("{:.1e}", v); };
   if (r.failure.empty()) {
-    fmt::print(fmt::runtime(columns), r.scene, r.method, fmt::format("{:.0e}", r.tolerance),
+    fmt::print(fmt::runtime(transient_columns), r.scene, r.method, fmt::format("{:.0e}", r.tolerance),
                fmt::format("{:.4f}", r.seconds), fmt::format("{:.0f}", r.simulated / r.seconds), number(r.error),
                number(r.hub_error), number(r.energy), r.steps, r.evaluations, r.events);
   } else {
@@ -95,7 +95,7 @@ int bench_transient_command(const BenchArguments& a, const CommonOptions& common
       common.out.empty() ? std::filesystem::path("results/bench_transient") : common.out;
   const bool table = !common.json && !common.quiet;
   std::filesystem::create_directories(folder);
-  if (table) print_heading();
+  if (table) print_transient_heading();
   const std::vector<TransientBench> rows = bench_transient(a.scenes, a.longest, [table](const TransientBench& row) {
     if (table) print_row(row);
   });

@@ -166,7 +166,7 @@ Pose pose_at(const Scene& scene, const System& system, const Eigen::VectorXd& y)
 
 namespace {
 
-constexpr int vtk_line = 3, vtk_hexahedron = 12;  // lines of two points: meshio skips polylines
+constexpr int cell_line = 3, cell_hexahedron = 12;  // lines of two points: meshio skips polylines
 
 /// The whole scene at one time as one grid; cell data "body" numbers hub and booms from 0.
 VtkGrid grid_of(const Pose& pose, const System& system) {
@@ -177,7 +177,7 @@ VtkGrid grid_of(const Pose& pose, const System& system) {
   Eigen::MatrixXd displacement = Eigen::MatrixXd::Zero(3, total);
   std::vector<double> body;
   grid.points.leftCols(8) = pose.hub;
-  grid.cells.push_back({vtk_hexahedron, {0, 1, 2, 3, 4, 5, 6, 7}});
+  grid.cells.push_back({cell_hexahedron, {0, 1, 2, 3, 4, 5, 6, 7}});
   body.push_back(0);
   Eigen::Index at = 8;
   for (size_t b = 0; b < pose.booms.size(); ++b) {
@@ -185,7 +185,7 @@ VtkGrid grid_of(const Pose& pose, const System& system) {
     displacement.middleCols(at, pose.booms[b].cols()) = pose.deflection[b];
     for (const std::vector<int>& line : system.appendages()[b].body.display.lines) {
       for (size_t k = 0; k + 1 < line.size(); ++k) {
-        grid.cells.push_back({vtk_line, {line[k] + static_cast<int>(at), line[k + 1] + static_cast<int>(at)}});
+        grid.cells.push_back({cell_line, {line[k] + static_cast<int>(at), line[k + 1] + static_cast<int>(at)}});
         body.push_back(static_cast<double>(b + 1));
       }
     }

@@ -221,7 +221,7 @@ void set_corners(const Scene& scene, IntegratorOptions& o) {
   for (const WheelScene& w : scene.wheels) add(w.torque);
   for (const WheelTurn& t : turns_of(scene.turns)) add_corners(rest_to_rest(t.manoeuvre));
   std::ranges::sort(o.corners);
-  o.corners.erase(std::ranges::unique(o.corners).begin(), o.corners.end());
+  o.corners.erase(std::unique(o.corners.begin(), o.corners.end()), o.corners.end());
 }
 
 namespace {

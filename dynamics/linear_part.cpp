@@ -16,7 +16,7 @@ namespace {
 
 constexpr int functions = collocation::degree + 3;  // phi_0 .. phi_(degree + 2)
 
-constexpr Index terms = collocation::points;
+constexpr Index collocation_terms = collocation::points;
 
 /// (zr, zi) = sum over k of b_k times v_k, complex, in halves of m; v_k are the columns z0, M.
 FLEXBOOM_FOR_EACH_PROCESSOR
@@ -27,7 +27,7 @@ void sum_of_products(Index m, const double* b, const double* z0, const double* M
   for (Index i = 0; i < m; ++i) {
     double re = b[i] * z0[i] - b[m + i] * z0[m + i], im = b[i] * z0[m + i] + b[m + i] * z0[i];
 #pragma GCC unroll 8
-    for (Index k = 0; k < terms; ++k) {
+    for (Index k = 0; k < collocation_terms; ++k) {
       const double br = b[2 * m * (k + 1) + i], bi = b[2 * m * (k + 1) + m + i];
       const double vr = M[2 * m * k + i], vi = M[2 * m * k + m + i];
       re += br * vr - bi * vi;

@@ -394,7 +394,7 @@ class MultipliersFlight final : public DaeProblem {
   std::vector<Clearance> before_;
   std::vector<double> largest_gap_;
   VectorXd y_, y_dot_, sample_, rows_, rates_;
-  Assembly assembly_;
+  redundant::Assembly assembly_;
   std::unique_ptr<StateScales> scales_;
   std::unique_ptr<Ida> ida_;
   long steps_ = 0;

@@ -115,7 +115,7 @@ TimeCourse trapezoid(const Manoeuvre& m) {
                                {t3, {m.angle, 0, 0, 0}}};
   TimeCourse c;
   c.corners = {m.start, t1, t2, t3};
-  c.corners.erase(std::ranges::unique(c.corners).begin(), c.corners.end());
+  c.corners.erase(std::unique(c.corners.begin(), c.corners.end()), c.corners.end());
   c.function = split([pieces = std::move(pieces)](double t) {
     const Piece& p = piece_at(pieces, t);
     return std::isfinite(p.begin) ? at(p, t) : std::array<double, 3>{};

@@ -2,6 +2,7 @@
 
 #include "fem/check.hpp"
 #include "fem/element.hpp"
+#include "fem/round_off.hpp"
 #include "fem/validation.hpp"
 
 #include <fmt/format.h>
@@ -16,10 +17,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int max_order = 12;
+constexpr int max_beam_order = 12;
 constexpr int default_elements = 8;   // of a boom whose segments leave the choice to make_mesh
 constexpr int max_elements = 100000;  // of a segment; more is a typing error
-constexpr double round_off = 1e-12;   // relative
 
 void validate_segment(const BeamSegment& segment, const BeamGeometry& boom) {
   require(std::isfinite(segment.length) && segment.length > 0,
@@ -33,13 +33,13 @@ void validate_segment(const BeamSegment& segment, const BeamGeometry& boom) {
 
 void validate_attachment(const RigidAttachment& attachment, double boom_length) {
   const double x = attachment.position;
-  require(std::isfinite(x) && x >= 0 && x <= boom_length * (1 + round_off),
+  require(std::isfinite(x) && x >= 0 && x <= boom_length * (1 + relative_round_off),
           fmt::format("position is {} m; the boom reaches from 0 to {} m", x, boom_length));
   validate_rigid(attachment.mass, attachment.inertia, attachment.offset);
 }
 
 void validate_order(int order) {
-  require(order >= 1 && order <= max_order, fmt::format("order is {}; it must be 1 to {}", order, max_order));
+  require(order >= 1 && order <= max_beam_order, fmt::format("order is {}; it must be 1 to {}", order, max_beam_order));
 }
 
 // Where nodes are needed, as fractions of a segment: 0, attachments inside, 1.
@@ -47,8 +47,9 @@ std::vector<double> cuts_of_segment(const BeamGeometry& boom, double start, doub
   std::vector<double> cuts = {0, 1};
   for (const RigidAttachment& attachment : boom.attachments) {
     const double s = (attachment.position - start) / length;
-    const bool is_new = std::none_of(
-        cuts.begin(), cuts.end(), [&](double cut) { return std::abs(s - cut) * length <= round_off * boom.length(); });
+    const bool is_new = std::none_of(cuts.begin(), cuts.end(), [&](double cut) {
+      return std::abs(s - cut) * length <= relative_round_off * boom.length();
+    });
     if (s > 0 && s < 1 && is_new) cuts.push_back(s);
   }
   std::sort(cuts.begin(), cuts.end());

@@ -1,6 +1,7 @@
 #include "fem/boom_plan.hpp"
 
 #include "fem/check.hpp"
+#include "fem/round_off.hpp"
 #include "fem/validation.hpp"
 
 #include <fmt/format.h>
@@ -12,8 +13,7 @@
 namespace flexboom {
 namespace {
 
-constexpr double round_off = 1e-12;  // relative
-constexpr int max_order = 8;
+constexpr int max_solid_order = 8;
 // A quarter of a circle in one element of degree p: quadratic fields (the contraction across in bending) are sines of
 // twice the angle, which polynomials follow better when nodes lie slightly nearer the middle. With p = 4 the bending
 // frequencies of a bar are wrong by 2e-6 instead of 1.2e-5; the area pays 4e-6 (p = 4) to 4e-13 (p = 8).
@@ -21,11 +21,11 @@ constexpr double uneven_quarter = 0.03;
 constexpr double slender_ratio = 62;   // length over half depth
 constexpr int max_divisions = 100000;  // of anything; more is a typing error
 
-bool same(double a, double b) { return std::abs(a - b) <= round_off * std::max(std::abs(a), std::abs(b)); }
+bool same(double a, double b) { return std::abs(a - b) <= relative_round_off * std::max(std::abs(a), std::abs(b)); }
 
 bool same(const SectionShape& a, const SectionShape& b) {
   if (a.index() != b.index()) return false;
-  return extent(a).isApprox(extent(b), round_off) && same(end_depth(a), end_depth(b));
+  return extent(a).isApprox(extent(b), relative_round_off) && same(end_depth(a), end_depth(b));
 }
 
 double start_of(const BeamGeometry& boom, int segment) {
@@ -37,7 +37,7 @@ double start_of(const BeamGeometry& boom, int segment) {
 bool holds_body_at_tip(const BeamGeometry& boom) {
   const double length = boom.length();
   return std::any_of(boom.attachments.begin(), boom.attachments.end(),
-                     [&](const RigidAttachment& a) { return a.position >= length * (1 - round_off); });
+                     [&](const RigidAttachment& a) { return a.position >= length * (1 - relative_round_off); });
 }
 
 // ---- runs and their ring lines
@@ -141,7 +141,7 @@ std::vector<double> cuts_of_piece(double length, bool start_graded, bool end_gra
 // Ends of pieces of a segment, relative to its start: attachments inside and its end.
 std::vector<double> piece_ends(const BeamGeometry& boom, double start, double length) {
   std::vector<double> ends;
-  const double tolerance = round_off * boom.length();
+  const double tolerance = relative_round_off * boom.length();
   for (const RigidAttachment& attachment : boom.attachments) {
     const double x = attachment.position - start;
     if (x > tolerance && x < length - tolerance) ends.push_back(x);
@@ -253,7 +253,7 @@ void validate(const BeamGeometry& boom, const SolidOptions& options) {
   validate_slit(boom, options.slit);
   require(std::isfinite(options.accuracy) && options.accuracy > 0 && options.accuracy < 1,
           fmt::format("accuracy is {}; it must lie between 0 and 1", options.accuracy));
-  require_at_least(options.order, 0, max_order, "order");
+  require_at_least(options.order, 0, max_solid_order, "order");
   const SolidGrading& g = options.grading;
   require_at_least(g.sectors, 0, max_divisions, "grading: sectors");
   require_at_least(g.rings, 0, max_divisions, "grading: rings");
@@ -290,9 +290,10 @@ constexpr std::array<Choice, 9> choices = {{{1, 1, {4, 3, 120, 0, 1, 3, 0, 0.15}
 const Choice& choice_for(const SolidOptions& options) {
   const Choice* best = nullptr;
   for (const Choice& choice : choices) {
-    if (options.order != 0 ? choice.order != options.order : choice.reached == 1 || choice.order == max_order) continue;
+    if (options.order != 0 ? choice.order != options.order : choice.reached == 1 || choice.order == max_solid_order)
+      continue;
     best = &choice;
-    if (choice.reached <= options.accuracy * (1 + round_off)) break;
+    if (choice.reached <= options.accuracy * (1 + relative_round_off)) break;
   }
   return *best;
 }

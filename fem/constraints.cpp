@@ -1,5 +1,6 @@
 #include "fem/constraints.hpp"
 
+#include "fem/at.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
@@ -17,8 +18,6 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Triplets = std::vector<Eigen::Triplet<double>>;
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 void add_term(ConstraintRow& row, int dof, double coefficient) {
   if (coefficient != 0) row.terms.emplace_back(dof, coefficient);

@@ -1,5 +1,6 @@
 #include "fem/deck_tie.hpp"
 
+#include "fem/at.hpp"
 #include "fem/element.hpp"
 
 #include <Eigen/Dense>
@@ -20,8 +21,6 @@ using Weights = std::array<double, 8>;
 
 constexpr int faces_per_leaf = 4;
 constexpr int newton_steps = 40;
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 struct Shapes {
   Weights N{}, dr{}, ds{};
@@ -110,16 +109,18 @@ double distance_to_box(const Vector3d& low, const Vector3d& high, const Vector3d
 }
 
 using Corners = std::array<int, 4>;  // -1: a triangle
-constexpr std::array<Corners, 6> hexahedron = {
+constexpr std::array<Corners, 6> faces_of_hexahedron = {
     {{0, 1, 2, 3}, {4, 7, 6, 5}, {0, 4, 5, 1}, {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}}};
-constexpr std::array<Corners, 4> tetrahedron = {{{0, 1, 2, -1}, {0, 3, 1, -1}, {1, 3, 2, -1}, {2, 3, 0, -1}}};
-constexpr std::array<Corners, 5> wedge = {{{0, 1, 2, -1}, {3, 5, 4, -1}, {0, 3, 4, 1}, {1, 4, 5, 2}, {2, 5, 3, 0}}};
+constexpr std::array<Corners, 4> faces_of_tetrahedron = {{{0, 1, 2, -1}, {0, 3, 1, -1}, {1, 3, 2, -1}, {2, 3, 0, -1}}};
+constexpr std::array<Corners, 5> faces_of_wedge = {
+    {{0, 1, 2, -1}, {3, 5, 4, -1}, {0, 3, 4, 1}, {1, 4, 5, 2}, {2, 5, 3, 0}}};
 
 using Edge = std::array<int, 2>;
-constexpr std::array<Edge, 12> hexahedron_edges = {
+constexpr std::array<Edge, 12> edges_of_hexahedron = {
     {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}}};
-constexpr std::array<Edge, 6> tetrahedron_edges = {{{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}}};
-constexpr std::array<Edge, 9> wedge_edges = {{{0, 1}, {1, 2}, {2, 0}, {3, 4}, {4, 5}, {5, 3}, {0, 3}, {1, 4}, {2, 5}}};
+constexpr std::array<Edge, 6> edges_of_tetrahedron = {{{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}}};
+constexpr std::array<Edge, 9> edges_of_wedge = {
+    {{0, 1}, {1, 2}, {2, 0}, {3, 4}, {4, 5}, {5, 3}, {0, 3}, {1, 4}, {2, 5}}};
 
 struct Topology {
   std::span<const Corners> faces;
@@ -130,11 +131,11 @@ struct Topology {
 Topology topology(Shape shape) {
   switch (shape) {
     case Shape::hexahedron:
-      return {hexahedron, hexahedron_edges, 8};
+      return {faces_of_hexahedron, edges_of_hexahedron, 8};
     case Shape::tetrahedron:
-      return {tetrahedron, tetrahedron_edges, 4};
+      return {faces_of_tetrahedron, edges_of_tetrahedron, 4};
     case Shape::wedge:
-      return {wedge, wedge_edges, 6};
+      return {faces_of_wedge, edges_of_wedge, 6};
     default:
       return {};
   }

@@ -99,7 +99,7 @@ constexpr ElementType solid_row(std::string_view name, Shape shape, int (*node_c
 }
 
 // The table: one row per element.
-constexpr std::array<ElementType, 12> table{{
+constexpr std::array<ElementType, 12> types{{
     beam_row("beam-euler-bernoulli"),
     beam_row("beam-timoshenko"),
     solid_row<Hexahedron>("hex", Shape::hexahedron, Hexahedron::node_count, Hexahedron::orders),
@@ -140,18 +140,18 @@ GaussRule make_gauss_rule(int n) {
 
 }  // namespace
 
-std::span<const ElementType> element_types() { return table; }
+std::span<const ElementType> element_types() { return types; }
 
 int element_type(std::string_view name) {
   std::string known;
-  for (size_t i = 0; i < table.size(); ++i) {
-    if (table[i].name == name) return static_cast<int>(i);
-    known += fmt::format("{}\"{}\"", i ? ", " : "", table[i].name);
+  for (size_t i = 0; i < types.size(); ++i) {
+    if (types[i].name == name) return static_cast<int>(i);
+    known += fmt::format("{}\"{}\"", i ? ", " : "", types[i].name);
   }
   throw InputError(fmt::format("element type \"{}\" is not known; there are {}", name, known));
 }
 
-const ElementType& type_of(const Element& element) { return table[static_cast<size_t>(element.type)]; }
+const ElementType& type_of(const Element& element) { return types[static_cast<size_t>(element.type)]; }
 
 const GaussRule& gauss_rule(int n) {
   static std::array<GaussRule, max_gauss_points + 1> rules;

@@ -13,7 +13,7 @@ namespace {
 
 // Lines, triangles and quadrangles carry sets only: {type, dimension, nodes}. Numbers as in Gmsh's reference manual,
 // "MSH file format", those of order above 5 as in its GmshDefines.h.
-constexpr std::array<std::array<int, 3>, 48> carriers = {{
+constexpr std::array<std::array<int, 3>, 48> gmsh_carriers = {{
     {15, 0, 1},  {1, 1, 2},    {8, 1, 3},    {26, 1, 4},  {27, 1, 5},  {28, 1, 6},  {62, 1, 7},  {63, 1, 8},
     {64, 1, 9},  {65, 1, 10},  {66, 1, 11},  {2, 2, 3},   {9, 2, 6},   {20, 2, 9},  {21, 2, 10}, {22, 2, 12},
     {23, 2, 15}, {24, 2, 15},  {25, 2, 21},  {42, 2, 28}, {43, 2, 36}, {44, 2, 45}, {45, 2, 55}, {46, 2, 66},
@@ -34,7 +34,7 @@ std::vector<int> triquadratic_order() {
 
 std::vector<GmshKind> all_kinds() {
   std::vector<GmshKind> kinds;
-  for (const auto& [type, dimension, nodes] : carriers) kinds.push_back({type, dimension, nodes, "", 1, {}});
+  for (const auto& [type, dimension, nodes] : gmsh_carriers) kinds.push_back({type, dimension, nodes, "", 1, {}});
   const std::vector<int> hex27 = triquadratic_order();
   kinds.push_back({4, 3, 4, "tet4", 1, {}});
   kinds.push_back({5, 3, 8, "hex8", 1, {}});
@@ -51,14 +51,14 @@ std::vector<GmshKind> all_kinds() {
   return kinds;
 }
 
-const std::vector<GmshKind>& kinds() {
+const std::vector<GmshKind>& known_kinds() {
   static const std::vector<GmshKind> all = all_kinds();
   return all;
 }
 
 const GmshKind* found(auto matches) {
-  const auto kind = std::ranges::find_if(kinds(), matches);
-  return kind == kinds().end() ? nullptr : &*kind;
+  const auto kind = std::ranges::find_if(known_kinds(), matches);
+  return kind == known_kinds().end() ? nullptr : &*kind;
 }
 
 }  // namespace

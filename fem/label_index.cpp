@@ -1,5 +1,7 @@
 #include "fem/label_index.hpp"
 
+#include "fem/at.hpp"
+
 #include <algorithm>
 #include <numeric>
 
@@ -7,8 +9,6 @@ namespace flexboom {
 namespace {
 
 constexpr unsigned long sparsest = 4;  // entries of the table per label
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 }  // namespace
 

@@ -34,14 +34,15 @@ struct alignas(16) Two {
 /// A longer row, in as many registers as the processor needs for it: compilers keep a vector type that is wider than a
 /// register in memory.
 template <class Register, int registers>
-struct Row {
+struct LaneRow {
   static constexpr int width = registers * Register::width;
   Register part[registers];
 };
 
 /// y += a x.
 template <class Register, int registers>
-[[gnu::always_inline]] inline void add(Row<Register, registers>& y, double a, const Row<Register, registers>& x) {
+[[gnu::always_inline]] inline void add(LaneRow<Register, registers>& y, double a,
+                                       const LaneRow<Register, registers>& x) {
 #pragma GCC unroll 4
   for (int p = 0; p < registers; ++p) y.part[p].of += a * x.part[p].of;
 }

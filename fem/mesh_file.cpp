@@ -34,7 +34,7 @@ constexpr std::array<std::string_view, 4> nastran_extensions = {".bdf", ".nas", 
 constexpr std::array<std::string_view, 1> vtk_extensions = {".vtu"};
 constexpr std::array<std::string_view, 4> geometry_extensions = {".step", ".stp", ".brep", ".geo"};
 
-constexpr std::array<MeshFormat, 5> table{{
+constexpr std::array<MeshFormat, 5> formats{{
     {"Gmsh", gmsh_extensions, from_memory<read_gmsh>, write_gmsh},
     {"CalculiX and Abaqus", abaqus_extensions, from_memory<read_abaqus>, write_deck},
     {"Nastran", nastran_extensions, from_memory<read_nastran>, nullptr},
@@ -50,7 +50,7 @@ std::string lower_case(std::string text) {
 // Extensions of the formats that a choice has a function for.
 std::string extensions_with(const auto& has) {
   std::string list;
-  for (const MeshFormat& format : table) {
+  for (const MeshFormat& format : formats) {
     if (!has(format)) continue;
     for (const std::string_view extension : format.extensions) {
       list += fmt::format("{}{}", list.empty() ? "" : ", ", extension);
@@ -61,7 +61,7 @@ std::string extensions_with(const auto& has) {
 
 const MeshFormat* format_of(const fs::path& path) {
   const std::string extension = lower_case(path.extension().string());
-  for (const MeshFormat& format : table) {
+  for (const MeshFormat& format : formats) {
     if (std::ranges::count(format.extensions, extension) > 0) return &format;
   }
   return nullptr;
@@ -69,7 +69,7 @@ const MeshFormat* format_of(const fs::path& path) {
 
 }  // namespace
 
-std::span<const MeshFormat> mesh_formats() { return table; }
+std::span<const MeshFormat> mesh_formats() { return formats; }
 
 MeshFile read_mesh(const fs::path& path) {
   const auto reads = [](const MeshFormat& format) { return format.read != nullptr; };

@@ -1,5 +1,6 @@
 #include "fem/mesh_sets.hpp"
 
+#include "fem/at.hpp"
 #include "fem/element.hpp"
 
 #include <fmt/format.h>
@@ -11,8 +12,6 @@
 
 namespace flexboom {
 namespace {
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 // Calls `visit` with every node that the mesh refers to outside of its node sets.
 void for_each_node(Mesh& mesh, const auto& visit) {

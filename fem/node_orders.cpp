@@ -13,7 +13,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Place = Eigen::Vector3i;  // i, j, k of a node
 
-constexpr std::array<std::array<int, 3>, 8> corners = {
+constexpr std::array<std::array<int, 3>, 8> corner_steps = {
     {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}};
 
 /// Nodes of a line, quadrangle or hexahedron inside the big one, in the order of a format.
@@ -37,7 +37,8 @@ class NodeList {
 
 std::array<Place, 8> corner_places(const Place& origin, int p) {
   std::array<Place, 8> result;
-  for (size_t c = 0; c < 8; ++c) result[c] = origin + p * Place(corners[c][0], corners[c][1], corners[c][2]);
+  for (size_t c = 0; c < 8; ++c)
+    result[c] = origin + p * Place(corner_steps[c][0], corner_steps[c][1], corner_steps[c][2]);
   return result;
 }
 

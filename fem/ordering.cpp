@@ -1,5 +1,6 @@
 #include "fem/ordering.hpp"
 
+#include "fem/at.hpp"
 #include "fem/check.hpp"
 #include "fem/quotient_graph.hpp"
 
@@ -18,8 +19,6 @@ constexpr int small_problem = 2000;  // unknowns; below, every order is cheap
 
 /// Levels in a slice: of 2 to 16 tried on bars of 6 x 6 to 16 x 16 quadratic elements, 4 gave the least work or nearly.
 constexpr int slice_levels = 4;
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 /// Bodies this much longer than wide are cut across only. Of quadratic bars 4 to 21 times as long as wide, METIS alone
 /// took 23 to 55 % more work than slices and as long as a tenth of the factorisation, AMD 1.8 to 8 times the work.
@@ -136,9 +135,9 @@ double slenderness(const QuotientGraph& graph, const Levels& levels) {
 double cost(const Ordering& order) { return order.flops + 500 * order.nonzeros; }
 
 /// The cheapest order so far.
-class Choice {
+class BestOrdering {
  public:
-  explicit Choice(const QuotientGraph& graph) : graph_(graph) {}
+  explicit BestOrdering(const QuotientGraph& graph) : graph_(graph) {}
 
   void consider(const char* name, std::vector<int> order) {
     if (order.size() != graph_.weight.size()) return;
@@ -175,7 +174,7 @@ class Choice {
 
 Ordering fill_reducing_ordering(const SparseMatrix& lower_pattern) {
   const QuotientGraph graph = quotient_graph(lower_pattern);
-  Choice choice(graph);
+  BestOrdering choice(graph);
   if (lower_pattern.cols() < small_problem) {
     choice.consider("amd", CholmodGraph(graph).amd());
     return choice.result();

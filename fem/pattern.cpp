@@ -1,5 +1,6 @@
 #include "fem/pattern.hpp"
 
+#include "fem/at.hpp"
 #include "fem/check.hpp"
 #include "fem/parallel.hpp"
 
@@ -13,8 +14,6 @@
 
 namespace flexboom {
 namespace {
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 /// Elements of each entity, as compressed rows.
 struct Incidence {

@@ -1,5 +1,7 @@
 #include "fem/quotient_graph.hpp"
 
+#include "fem/at.hpp"
+
 #include <algorithm>
 #include <cstdint>
 #include <numeric>
@@ -7,8 +9,6 @@
 
 namespace flexboom {
 namespace {
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 std::uint64_t scrambled(int i) {  // splitmix64
   std::uint64_t z = static_cast<std::uint64_t>(i) * 0x9e3779b97f4a7c15ULL + 0x9e3779b97f4a7c15ULL;

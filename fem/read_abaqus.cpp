@@ -11,8 +11,7 @@ namespace flexboom {
 namespace abaqus {
 namespace {
 
-constexpr long largest_label = 999'999'999'999;  // 12 digits: more is a fault of writing
-constexpr size_t calculix_number = 20;           // characters
+constexpr size_t calculix_number = 20;  // characters
 
 struct Row {
   std::string_view name;

@@ -1,3 +1,4 @@
+#include "fem/at.hpp"
 #include "fem/deck_mesh.hpp"
 #include "fem/mesh_sets.hpp"
 #include "fem/read_abaqus_lookup.hpp"
@@ -17,8 +18,6 @@ using Eigen::Vector3d;
 
 constexpr double default_tolerance = 0.025;  // of the mean edge of the master surface, as CalculiX
 constexpr double aligned = 1e-12;            // parts of a direction below this are round-off
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 /// Makes supports and connections from the lines of a deck.
 class Connections {

@@ -14,6 +14,8 @@
 // A deck as it was written, before numbers and names are looked up: they may be used before they are defined.
 namespace flexboom::abaqus {
 
+inline constexpr long largest_label = 999'999'999'999;  // 12 digits: more is a fault of writing
+
 enum class Role { solid, beam, mass, reference, left_out };  // reference: of DISTRIBUTING COUPLING
 
 struct ElementKind {

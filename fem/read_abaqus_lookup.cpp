@@ -1,5 +1,6 @@
 #include "fem/read_abaqus_lookup.hpp"
 
+#include "fem/at.hpp"
 #include "fem/mesh_sets.hpp"
 
 #include <fmt/format.h>
@@ -12,8 +13,6 @@ namespace {
 
 constexpr long most_generated = 50'000'000;
 constexpr size_t most_looked_up = 200'000'000;  // members of all sets that connections and sections name
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 /// Keeps a small deck that names large sets again and again from filling the memory.
 const std::vector<int>& handed_out(Deck& deck, const Reference& reference, const std::vector<int>& members) {

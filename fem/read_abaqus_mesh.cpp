@@ -1,3 +1,4 @@
+#include "fem/at.hpp"
 #include "fem/element.hpp"
 #include "fem/mesh_sets.hpp"
 #include "fem/read_abaqus_lookup.hpp"
@@ -14,8 +15,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int beam_order = 4;  // of which one element is converged where a deck has many
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 Material material_of(const Deck& deck, const SectionLine& section) {
   const auto found = deck.materials.find(section.material);

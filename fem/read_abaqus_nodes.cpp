@@ -14,7 +14,6 @@ namespace {
 using Eigen::Vector3d;
 using Fields = std::vector<std::string_view>;
 
-constexpr long largest_label = 999'999'999'999;  // 12 digits: more is a fault of writing
 constexpr size_t most_copied_members = 10'000'000;
 constexpr int degrees_per_half_turn = 180;
 

@@ -1,3 +1,4 @@
+#include "fem/at.hpp"
 #include "fem/deck_mesh.hpp"
 #include "fem/mesh_sets.hpp"
 #include "fem/read_nastran_bulk.hpp"
@@ -12,8 +13,6 @@ namespace flexboom::nastran {
 namespace {
 
 constexpr long most_listed = 200'000'000;  // ids of all ranges
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 class Connections {
  public:

@@ -1,3 +1,4 @@
+#include "fem/at.hpp"
 #include "fem/element.hpp"
 #include "fem/mesh_sets.hpp"
 #include "fem/read_nastran_bulk.hpp"
@@ -18,8 +19,6 @@ using Eigen::Vector3d;
 constexpr int deepest_system = 100;  // systems defined in systems
 constexpr int beam_order = 4;        // of which one element is converged where a deck has many
 constexpr double radians_per_degree = std::numbers::pi / 180;
-
-size_t at(int i) { return static_cast<size_t>(i); }
 
 /// Origin and axes of a coordinate system in the basic one.
 struct Placed {

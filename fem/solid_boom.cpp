@@ -1,4 +1,5 @@
 #include "fem/solid_boom.hpp"
+#include "fem/round_off.hpp"
 #include "fem/shape_functions.hpp"
 
 #include "fem/boom_plan.hpp"
@@ -20,8 +21,6 @@ namespace {
 using Eigen::Index;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double round_off = 1e-12;  // relative
 
 // Lobatto points of `count` equal cells of [0, 1].
 std::vector<double> cell_points(int count, int order) {
@@ -180,7 +179,7 @@ std::vector<int> add_materials(Mesh& mesh, const BeamGeometry& boom) {
 std::vector<int> nodes_at(const Mesh& mesh, double x, double length) {
   std::vector<int> nodes;
   for (Index i = 0; i < mesh.nodes.cols(); ++i) {
-    if (std::abs(mesh.nodes(0, i) - x) <= round_off * length) nodes.push_back(static_cast<int>(i));
+    if (std::abs(mesh.nodes(0, i) - x) <= relative_round_off * length) nodes.push_back(static_cast<int>(i));
   }
   return nodes;
 }
@@ -189,7 +188,7 @@ void add_face_sets(Mesh& mesh, double length) {
   mesh.node_sets["root"] = nodes_at(mesh, 0, length);
   const std::vector<int>& tip = mesh.node_sets["tip"] = nodes_at(mesh, length, length);
   for (const int i : tip) {
-    if (mesh.nodes.col(i).tail<2>().norm() <= round_off * length) mesh.node_sets["tip_center"] = {i};
+    if (mesh.nodes.col(i).tail<2>().norm() <= relative_round_off * length) mesh.node_sets["tip_center"] = {i};
   }
 }
 
@@ -237,7 +236,7 @@ int add_reference(Mesh& mesh, const std::vector<double>& shares, double x, doubl
   const int reference = static_cast<int>(mesh.nodes.cols());
   mesh.nodes.conservativeResize(3, reference + 1);
   mesh.nodes.col(reference) << x, 0, 0;
-  if (x >= length * (1 - round_off)) {
+  if (x >= length * (1 - relative_round_off)) {
     mesh.rigid_connections.push_back({reference, std::move(section), all_components});
     return reference;
   }
@@ -252,8 +251,9 @@ void add_attachments(Mesh& mesh, const BeamGeometry& boom, const std::vector<dou
   std::vector<std::pair<double, int>> references;  // (position, node): bodies at one place share a node
   for (const RigidAttachment& attachment : boom.attachments) {
     const double x = std::min(attachment.position, length);
-    const auto found = std::find_if(references.begin(), references.end(),
-                                    [&](const auto& r) { return std::abs(r.first - x) <= round_off * length; });
+    const auto found = std::find_if(references.begin(), references.end(), [&](const auto& r) {
+      return std::abs(r.first - x) <= relative_round_off * length;
+    });
     const int node = found != references.end() ? found->second : add_reference(mesh, shares, x, length);
     if (found == references.end()) references.emplace_back(x, node);
     mesh.bodies.push_back({node, attachment.mass, attachment.inertia, attachment.offset});

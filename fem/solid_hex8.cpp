@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using elasticity::Lame;
 
-using Corners = Eigen::Matrix<double, 8, 3>;
+using CornerRows = Eigen::Matrix<double, 8, 3>;
 // Unknowns: displacements of the corners (24), amplitudes of the three incompatible displacements (9), of the
 // volumetric strains (3).
 constexpr Index displacements = 24, enhanced = 12, volumetric = 33;
@@ -34,19 +34,19 @@ struct Point {
 using Points = std::array<Point, 8>;
 
 // Shape functions at the points and the centre of the reference cube.
-struct Table {
+struct CubeTable {
   Eigen::Matrix3Xd points;
-  std::array<Corners, 8> slopes;
-  Corners centre;
+  std::array<CornerRows, 8> slopes;
+  CornerRows centre;
   // The parts of a trilinear function beyond the linear ones, eta zeta, zeta xi, xi eta, xi eta zeta: at the corners,
   // and their slopes at the points.
   Eigen::Matrix<double, 8, 4> hourglass;
   std::array<Eigen::Matrix<double, 4, 3>, 8> hourglass_slopes;
 };
 
-const Table& table() {
-  static const Table made = [] {
-    Table t;
+const CubeTable& cube_table() {
+  static const CubeTable made = [] {
+    CubeTable t;
     t.points = hexahedron_rule(2).points;
     t.centre = hex8_shapes(Vector3d::Zero()).gradients;
     for (Index a = 0; a < 8; ++a) {
@@ -69,8 +69,8 @@ void set_enhanced(Point& point, const Vector3d& xi, double ratio, const Matrix3d
 }
 
 // G(r, i) = d xi_r / d x_i.
-Points full_points(const Corners& X) {
-  const Table& t = table();
+Points full_points(const CornerRows& X) {
+  const CubeTable& t = cube_table();
   const Matrix3d J_centre = X.transpose() * t.centre, G_centre = J_centre.inverse();
   const double volume_centre = J_centre.determinant();
   Points points;
@@ -83,9 +83,9 @@ Points full_points(const Corners& X) {
   return points;
 }
 
-Points reduced_points(const Corners& X) {
-  const Table& t = table();
-  Corners mean = Corners::Zero();
+Points reduced_points(const CornerRows& X) {
+  const CubeTable& t = cube_table();
+  CornerRows mean = CornerRows::Zero();
   double volume = 0;
   for (size_t q = 0; q < 8; ++q) {
     const Matrix3d J = X.transpose() * t.slopes[q];
@@ -108,7 +108,7 @@ Points reduced_points(const Corners& X) {
 
 template <Hex8Strain strain>
 Points points_of(const Mesh& mesh, const Element& element) {
-  const Corners X = elasticity::local_positions(mesh, element);
+  const CornerRows X = elasticity::local_positions(mesh, element);
   return strain == Hex8Strain::full ? full_points(X) : reduced_points(X);
 }
 

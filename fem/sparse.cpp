@@ -44,20 +44,20 @@ template <class Rows>
 
 #ifdef FLEXBOOM_PROCESSORS
 [[gnu::target("avx512f")]] void by_8(const Columns& A, const double* x, double* y) {
-  accumulate<Row<Eight, 1>>(A, x, y);
+  accumulate<LaneRow<Eight, 1>>(A, x, y);
 }
 [[gnu::target("avx512f")]] void by_4(const Columns& A, const double* x, double* y) {
-  accumulate<Row<Four, 1>>(A, x, y);
+  accumulate<LaneRow<Four, 1>>(A, x, y);
 }
 [[gnu::target("avx2,fma")]] void by_8(const Columns& A, const double* x, double* y) {
-  accumulate<Row<Four, 2>>(A, x, y);
+  accumulate<LaneRow<Four, 2>>(A, x, y);
 }
 [[gnu::target("avx2,fma")]] void by_4(const Columns& A, const double* x, double* y) {
-  accumulate<Row<Four, 1>>(A, x, y);
+  accumulate<LaneRow<Four, 1>>(A, x, y);
 }
 #endif
-FLEXBOOM_ANY_PROCESSOR void by_8(const Columns& A, const double* x, double* y) { accumulate<Row<Two, 4>>(A, x, y); }
-FLEXBOOM_ANY_PROCESSOR void by_4(const Columns& A, const double* x, double* y) { accumulate<Row<Two, 2>>(A, x, y); }
+FLEXBOOM_ANY_PROCESSOR void by_8(const Columns& A, const double* x, double* y) { accumulate<LaneRow<Two, 4>>(A, x, y); }
+FLEXBOOM_ANY_PROCESSOR void by_4(const Columns& A, const double* x, double* y) { accumulate<LaneRow<Two, 2>>(A, x, y); }
 
 void add_product(const Columns& A, const Eight* x, Eight* y) {
   by_8(A, reinterpret_cast<const double*>(x), reinterpret_cast<double*>(y));

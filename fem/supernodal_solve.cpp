@@ -12,13 +12,13 @@ using Index = std::ptrdiff_t;
 
 /// y -= a x.
 template <class Register, int registers>
-FLEXBOOM_INLINE void subtract(Row<Register, registers>& y, double a, const Row<Register, registers>& x) {
+FLEXBOOM_INLINE void subtract(LaneRow<Register, registers>& y, double a, const LaneRow<Register, registers>& x) {
 #pragma GCC unroll 4
   for (int p = 0; p < registers; ++p) y.part[p].of -= a * x.part[p].of;
 }
 
 template <class Register, int registers>
-FLEXBOOM_INLINE void scale(Row<Register, registers>& y, double a) {
+FLEXBOOM_INLINE void scale(LaneRow<Register, registers>& y, double a) {
 #pragma GCC unroll 4
   for (int p = 0; p < registers; ++p) y.part[p].of *= a;
 }
@@ -112,7 +112,7 @@ FLEXBOOM_INLINE void solve(const Supernodes& L, Row* x, std::integer_sequence<in
 
 template <class Register, int columns, int width>
 FLEXBOOM_INLINE void solve(const Supernodes& L, double* x) {
-  using Rows = Row<Register, width / Register::width>;
+  using Rows = LaneRow<Register, width / Register::width>;
   solve<columns>(L, reinterpret_cast<Rows*>(x), std::make_integer_sequence<int, columns - 1>());
 }
 

@@ -13,7 +13,7 @@
 namespace flexboom {
 namespace {
 
-using Field = std::pair<std::string, Eigen::MatrixXd>;
+using NamedField = std::pair<std::string, Eigen::MatrixXd>;
 using Group = std::pair<std::string, std::vector<int>>;
 using Text = std::string;
 
@@ -84,7 +84,7 @@ void append_field(ArrayWriter& out, const Text& name, const Eigen::MatrixXd& val
   out.append("Float64", name, values.rows(), std::vector<double>(values.data(), values.data() + values.size()));
 }
 
-void append_fields(ArrayWriter& out, const char* tag, const std::vector<Field>& fields,
+void append_fields(ArrayWriter& out, const char* tag, const std::vector<NamedField>& fields,
                    const std::vector<Group>& groups, size_t count) {
   fmt::format_to(end_of(out.text), "<{}>\n", tag);
   for (const auto& [name, values] : fields) append_field(out, name, values);
@@ -111,7 +111,7 @@ void append_cells(ArrayWriter& out, const std::vector<VtkGrid::Cell>& cells) {
   out.text += "</Cells>\n";
 }
 
-void validate_fields(const char* where, const std::vector<Field>& fields, Eigen::Index count) {
+void validate_fields(const char* where, const std::vector<NamedField>& fields, Eigen::Index count) {
   for (const auto& [name, values] : fields) {
     require(values.rows() > 0 && values.cols() == count,
             fmt::format("{} field \"{}\" is {} x {}; it must have {} columns", where, name, values.rows(),

@@ -10,9 +10,9 @@
 namespace flexboom {
 namespace {
 
-constexpr int line = 3, voxel = 11, hexahedron = 12, triquadratic = 29, lagrange_hexahedron = 72;
+constexpr int vtk_line = 3, voxel = 11, hexahedron = 12, triquadratic = 29, lagrange_hexahedron = 72;
 
-struct Row {
+struct VtkRow {
   int type;
   std::string_view row;
   size_t points;
@@ -21,7 +21,7 @@ struct Row {
 
 // Rows that need no other order of points than ours; types as in vtkCellType.h. Lagrange cells (71, 73) of these orders
 // are numbered like the quadratic ones.
-constexpr std::array<Row, 10> same_order = {{
+constexpr std::array<VtkRow, 10> same_order = {{
     {hexahedron, "hex8", 8, 1},
     {25, "hex20", 20, 2},
     {triquadratic, "hex27", 27, 2},
@@ -34,8 +34,8 @@ constexpr std::array<Row, 10> same_order = {{
     {73, "wedge6", 6, 1},
 }};
 
-constexpr std::array<int, 25> carriers = {1,  2,  3,  4,  5,  6,  7,  8,  9,  21, 22, 23, 28,
-                                          30, 34, 35, 36, 51, 60, 61, 62, 68, 69, 70, 75};
+constexpr std::array<int, 25> vtk_carriers = {1,  2,  3,  4,  5,  6,  7,  8,  9,  21, 22, 23, 28,
+                                              30, 34, 35, 36, 51, 60, 61, 62, 68, 69, 70, 75};
 
 // vtkWedge counts the triangle 0 1 2 with its normal pointing out of the cell, vtkQuadraticWedge into it.
 const std::vector<int> linear_wedge_order = {0, 2, 1, 3, 5, 4};
@@ -50,18 +50,18 @@ std::string_view full_name(std::string_view row) {
 
 VtkSolid vtk_solid_of(const Element& element) {
   const ElementType& row = type_of(element);
-  if (row.shape == Shape::line) return {line, row.name, element.order, {}};
+  if (row.shape == Shape::line) return {vtk_line, row.name, element.order, {}};
   if (row.name == "hex") {
     const int type = element.order == 1 ? hexahedron : element.order == 2 ? triquadratic : lagrange_hexahedron;
     return {type, row.name, element.order, vtk_hexahedron_order(element.order, type == lagrange_hexahedron)};
   }
-  const auto found = std::ranges::find(same_order, full_name(row.name), &Row::row);
+  const auto found = std::ranges::find(same_order, full_name(row.name), &VtkRow::row);
   return {found->type, found->row, element.order, found->type == 13 ? linear_wedge_order : std::vector<int>{}};
 }
 
 VtkSolid vtk_solid(int type, size_t points, bool before_2_1) {
   if (type == voxel && points == 8) return {type, "hex8", 1, {0, 1, 3, 2, 4, 5, 7, 6}};
-  for (const Row& row : same_order) {
+  for (const VtkRow& row : same_order) {
     if (row.type == type && row.points == points)
       return {type, row.row, row.order, type == 13 ? linear_wedge_order : std::vector<int>{}};
   }
@@ -72,12 +72,12 @@ VtkSolid vtk_solid(int type, size_t points, bool before_2_1) {
   return {};
 }
 
-bool is_vtk_carrier(int type) { return std::ranges::count(carriers, type) > 0; }
+bool is_vtk_carrier(int type) { return std::ranges::count(vtk_carriers, type) > 0; }
 
 bool may_be_row(int type, std::string_view row) {
   if (row == "hex") return type == hexahedron || type == triquadratic;
   return std::ranges::any_of(same_order,
-                             [&](const Row& known) { return known.type == type && known.row == full_name(row); });
+                             [&](const VtkRow& known) { return known.type == type && known.row == full_name(row); });
 }
 
 }  // namespace flexboom

@@ -18,9 +18,9 @@ namespace {
 
 using Groups = std::vector<int>;  // tags of physical groups, ascending
 
-auto end_of(std::string& text) { return std::back_inserter(text); }
+auto text_end_of(std::string& text) { return std::back_inserter(text); }
 
-void require_holdable(const Mesh& mesh) {
+void require_gmsh_holds(const Mesh& mesh) {
   const auto lacks = [&mesh](const char* what, int node) {
     throw InputError(
         fmt::format("a .msh file cannot hold {} (node {}); write .vtu or .inp", what, mesh.node_label(node)));
@@ -108,19 +108,19 @@ Content content_of(const Mesh& mesh) {
 }
 
 void append_tags(std::string& text, const Groups& groups) {
-  fmt::format_to(end_of(text), " {}", groups.size());
-  for (const int tag : groups) fmt::format_to(end_of(text), " {}", tag);
+  fmt::format_to(text_end_of(text), " {}", groups.size());
+  for (const int tag : groups) fmt::format_to(text_end_of(text), " {}", tag);
 }
 
 void append_entities(std::string& text, const Mesh& mesh, const Content& content) {
   const auto lines =
       std::ranges::count_if(content.parts, [](const auto& part) { return part.first.kind->dimension == 1; });
-  fmt::format_to(end_of(text), "$Entities\n{} {} 0 {}\n", content.points.size(), lines,
+  fmt::format_to(text_end_of(text), "$Entities\n{} {} 0 {}\n", content.points.size(), lines,
                  content.parts.size() - static_cast<size_t>(lines));
   int tag = 0;
   for (const auto& [sets, nodes] : content.points) {
     const auto point = mesh.nodes.col(nodes.front());
-    fmt::format_to(end_of(text), "{} {} {} {}", ++tag, point(0), point(1), point(2));
+    fmt::format_to(text_end_of(text), "{} {} {} {}", ++tag, point(0), point(1), point(2));
     append_tags(text, sets);
     text += '\n';
   }
@@ -130,7 +130,7 @@ void append_entities(std::string& text, const Mesh& mesh, const Content& content
     for (const auto& [part, elements] : content.parts) {
       ++tag;
       if (part.kind->dimension != dimension) continue;
-      fmt::format_to(end_of(text), "{} {} {} {} {} {} {}", tag, low(0), low(1), low(2), high(0), high(1), high(2));
+      fmt::format_to(text_end_of(text), "{} {} {} {} {} {} {}", tag, low(0), low(1), low(2), high(0), high(1), high(2));
       append_tags(text, part.groups);
       text += " 0\n";
     }
@@ -140,11 +140,11 @@ void append_entities(std::string& text, const Mesh& mesh, const Content& content
 
 void append_nodes(std::string& text, const Mesh& mesh, const Part& home, const std::vector<long>& labels) {
   const Eigen::MatrixXd points = equispaced_from_lobatto(mesh, mesh.nodes);
-  fmt::format_to(end_of(text), "$Nodes\n1 {0} {1} {2}\n{3} 1 0 {0}\n", labels.size(), std::ranges::min(labels),
+  fmt::format_to(text_end_of(text), "$Nodes\n1 {0} {1} {2}\n{3} 1 0 {0}\n", labels.size(), std::ranges::min(labels),
                  std::ranges::max(labels), home.kind->dimension);
-  for (const long label : labels) fmt::format_to(end_of(text), "{}\n", label);
+  for (const long label : labels) fmt::format_to(text_end_of(text), "{}\n", label);
   for (Eigen::Index i = 0; i < points.cols(); ++i)
-    fmt::format_to(end_of(text), "{} {} {}\n", points(0, i), points(1, i), points(2, i));
+    fmt::format_to(text_end_of(text), "{} {} {}\n", points(0, i), points(1, i), points(2, i));
   text += "$EndNodes\n";
 }
 
@@ -152,7 +152,7 @@ void append_element(std::string& text, const Element& element, const std::vector
                     const std::vector<long>& labels) {
   for (size_t i = 0; i < element.nodes.size(); ++i) {
     const int node = element.nodes[order.empty() ? i : static_cast<size_t>(order[i])];
-    fmt::format_to(end_of(text), " {}", labels[static_cast<size_t>(node)]);
+    fmt::format_to(text_end_of(text), " {}", labels[static_cast<size_t>(node)]);
   }
   text += '\n';
 }
@@ -163,24 +163,24 @@ void append_elements(std::string& text, const Mesh& mesh, const Content& content
   size_t points = 0;
   for (const auto& [sets, nodes] : content.points) points += nodes.size();
   const long highest = std::ranges::max(labels);
-  fmt::format_to(end_of(text), "$Elements\n{} {} {} {}\n", content.points.size() + content.parts.size(),
+  fmt::format_to(text_end_of(text), "$Elements\n{} {} {} {}\n", content.points.size() + content.parts.size(),
                  points + labels.size(), std::min(std::ranges::min(labels), highest + 1),
                  highest + static_cast<long>(points));
   long label = highest;
   int tag = 0;
   for (const auto& [sets, nodes] : content.points) {
-    fmt::format_to(end_of(text), "0 {} 15 {}\n", ++tag, nodes.size());
+    fmt::format_to(text_end_of(text), "0 {} 15 {}\n", ++tag, nodes.size());
     for (const int node : nodes)
-      fmt::format_to(end_of(text), "{} {}\n", ++label, node_labels[static_cast<size_t>(node)]);
+      fmt::format_to(text_end_of(text), "{} {}\n", ++label, node_labels[static_cast<size_t>(node)]);
   }
   tag = 0;
   for (const auto& [part, elements] : content.parts) {
     const int p = mesh.elements[static_cast<size_t>(elements.front())].order;
     const std::vector<int> order = part.row == "hex" ? gmsh_hexahedron_order(p) : part.kind->node_order;
-    fmt::format_to(end_of(text), "{} {} {} {}\n", part.kind->dimension, ++tag, part.kind->type, elements.size());
+    fmt::format_to(text_end_of(text), "{} {} {} {}\n", part.kind->dimension, ++tag, part.kind->type, elements.size());
     for (const int e : elements) {
       const Element& element = mesh.elements[static_cast<size_t>(e)];
-      fmt::format_to(end_of(text), "{}", labels[static_cast<size_t>(e)]);
+      fmt::format_to(text_end_of(text), "{}", labels[static_cast<size_t>(e)]);
       append_element(text, element, order, node_labels);
     }
   }
@@ -189,12 +189,12 @@ void append_elements(std::string& text, const Mesh& mesh, const Content& content
 
 std::string gmsh_text(const Mesh& mesh) {
   require(mesh.nodes.cols() > 0 && !mesh.elements.empty(), "the mesh has no elements");
-  require_holdable(mesh);
+  require_gmsh_holds(mesh);
   const Content content = content_of(mesh);
   std::string text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
-  fmt::format_to(end_of(text), "$PhysicalNames\n{}\n", content.names.size());
+  fmt::format_to(text_end_of(text), "$PhysicalNames\n{}\n", content.names.size());
   for (size_t i = 0; i < content.names.size(); ++i)
-    fmt::format_to(end_of(text), "{} {} \"{}\"\n", content.names[i].first, i + 1, content.names[i].second);
+    fmt::format_to(text_end_of(text), "{} {} \"{}\"\n", content.names[i].first, i + 1, content.names[i].second);
   text += "$EndPhysicalNames\n";
   append_entities(text, mesh, content);
   const std::vector<long> labels = file_labels(mesh.node_labels, static_cast<size_t>(mesh.nodes.cols()));

@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 
 bool is_beam(const Element& element) { return type_of(element).shape == Shape::line; }
 
-void require_holdable(const Mesh& mesh) {
+void require_vtu_holds(const Mesh& mesh) {
   const auto lacks = [&mesh](const char* what, int node) {
     throw InputError(fmt::format("a .vtu file cannot hold {} (node {}); write .inp", what, mesh.node_label(node)));
   };
@@ -168,7 +168,7 @@ MatrixXd vtk_point_values(const Mesh& mesh, const MatrixXd& nodal) { return equi
 void write_vtu(const std::filesystem::path& path, const Mesh& mesh) {
   VtkGrid grid;
   try {
-    require_holdable(mesh);
+    require_vtu_holds(mesh);
     grid = vtk_grid(mesh);
     add_properties(grid, mesh);
     add_rows(grid, mesh);

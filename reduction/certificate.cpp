@@ -23,9 +23,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double round_off = 1e-11;    // of sums over many points, relative to the largest of their kind
-constexpr double orthogonal = 1e-7;    // what eigen-solvers leave between modes: vectors good to 1e-6 of each other
-constexpr double static_error = 1e-8;  // of a static response that the basis holds
+constexpr double sum_round_off = 1e-11;  // of sums over many points, relative to the largest of their kind
+constexpr double orthogonal = 1e-7;      // what eigen-solvers leave between modes: vectors good to 1e-6 of each other
+constexpr double static_error = 1e-8;    // of a static response that the basis holds
 
 /// value <= reference, or equal to `slack` of it.
 BodyCheck at_most(std::string name, double value, double reference, double slack) {
@@ -46,7 +46,7 @@ void add_bessel(std::vector<BodyCheck>& checks, const ReducedBody& body) {
   double largest = 0;
   for (Index k = 0; k < body.n(); ++k)
     largest = std::max(largest, body.Ct.col(k).squaredNorm() / (body.m * body.Me(k, k)));
-  checks.push_back(at_most("Bessel: |Ct_k|^2 / (m Me_kk)", largest, 1, round_off));
+  checks.push_back(at_most("Bessel: |Ct_k|^2 / (m Me_kk)", largest, 1, sum_round_off));
   const MatrixXd C = rigid_coupling(body);
   const MatrixXd M = rigid_mass(body);
   // Scaled so that kilograms and their moments weigh alike.
@@ -79,8 +79,8 @@ void add_identities(std::vector<BodyCheck>& checks, const ReducedBody& body) {
       J2 = std::max(J2, std::abs(body.J2[kk][ll].trace() - 2 * body.Me(k, l)) / scale);
     }
   }
-  checks.push_back(vanishing("Cr1[k] e_l + Cr1[l] e_k", Cr1, round_off));
-  checks.push_back(vanishing("tr J2 - 2 Me", J2, round_off));
+  checks.push_back(vanishing("Cr1[k] e_l + Cr1[l] e_k", Cr1, sum_round_off));
+  checks.push_back(vanishing("tr J2 - 2 Me", J2, sum_round_off));
 }
 
 void add_mean_axes(std::vector<BodyCheck>& checks, const ReducedBody& body) {
@@ -147,7 +147,7 @@ std::vector<BodyCheck> body_checks(const ReducedBody& body) {
 std::vector<BodyCheck> certificate(const ReducedBody& body, const Mesh& mesh, const Assembly& assembly,
                                    const Clamp& clamp, const ModalBasis& basis,
                                    const std::vector<std::string>& exact_at, int threads, const StaticSolver* statics) {
-  std::vector<BodyCheck> checks = check_invariants(body, mesh, assembly, basis, round_off);
+  std::vector<BodyCheck> checks = check_invariants(body, mesh, assembly, basis, sum_round_off);
   add_rigid_energy(checks, mesh, assembly, threads);
   if (body.n() > 0 && body.frame == "clamped") {
     const Unknowns left = unknowns(mesh, assembly.dofs, clamp);

@@ -17,19 +17,19 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double tolerance_of_few = 1e-12;  // fewer than many_unknowns
-constexpr double tolerance_of_many = 2e-7;  // measured, see README
-constexpr double guard_tolerance = 1e-4;    // residual of the modes beyond those wanted
-constexpr double negligible = 1e-13;        // a new direction this short, relative to its block, is round-off
-constexpr double same = 1e-6;               // Ritz values this close may be copies of one
-constexpr double random_part = 1e-4;        // of start vectors, beside shapes of size 1: what no shape holds
+constexpr double tolerance_of_few = 1e-12;        // fewer than many_unknowns
+constexpr double block_tolerance_of_many = 2e-7;  // measured, see README
+constexpr double guard_tolerance = 1e-4;          // residual of the modes beyond those wanted
+constexpr double negligible = 1e-13;              // a new direction this short, relative to its block, is round-off
+constexpr double same_value = 1e-6;               // Ritz values this close may be copies of one
+constexpr double random_part = 1e-4;              // of start vectors, beside shapes of size 1: what no shape holds
 constexpr Index max_block = 32;
 constexpr double suspicious = 1e15;  // largest nu times the scale of lambda: the shift may be an eigenvalue
 
 /// Right-hand sides per solve. Few: the factor is read too often. Many: the Krylov space has a low degree. Measured
 /// flat between 4 and 8 for 24 000 to 61 000 unknowns and 10 to 40 modes; 8 see the six rigid modes of a free body at
 /// once.
-Index block_size(const EigenRequest& request) { return request.count < 7 ? 4 : 8; }
+Index vectors_in_block(const EigenRequest& request) { return request.count < 7 ? 4 : 8; }
 
 /// Ritz pairs of the inverse: theta = 1 / (lambda - sigma), largest first.
 struct Ritz {
@@ -49,8 +49,8 @@ class BlockLanczos {
         request_(request),
         tolerance_(request.tolerance > 0        ? request.tolerance
                    : p.K.rows() < many_unknowns ? tolerance_of_few
-                                                : tolerance_of_many),
-        start_width_(std::min<Index>(block_size(request), p.K.rows())),
+                                                : block_tolerance_of_many),
+        start_width_(std::min<Index>(vectors_in_block(request), p.K.rows())),
         scale_(stiffness_scale(p)),
         max_steps_(300 + 2 * request.count),
         basis_(p.M, std::min<Index>(p.K.rows(), request.count + std::max<Index>(3 * max_block, request.count / 2))),
@@ -171,7 +171,7 @@ class BlockLanczos {
     const VectorXd theta = ritz.theta.head(request_.count);
     Index largest = 1;
     for (Index i = 1, group = 1; i < theta.size(); ++i) {
-      group = theta(i) > (1 - same) * theta(i - 1) ? group + 1 : 1;
+      group = theta(i) > (1 - same_value) * theta(i - 1) ? group + 1 : 1;
       largest = std::max(largest, group);
     }
     if (largest < starts_) return true;
@@ -179,7 +179,7 @@ class BlockLanczos {
     if (first_time) steps_to_trust_ = std::min(steps_to_trust_, since_start_);
     if (!trusted()) return false;
     const bool nothing_new =
-        !first_time && ((theta - theta_at_start_).array().abs() <= same * theta_at_start_.array()).all();
+        !first_time && ((theta - theta_at_start_).array().abs() <= same_value * theta_at_start_.array()).all();
     theta_at_start_ = theta;
     return nothing_new;
   }

@@ -23,7 +23,7 @@ struct Pair {
 constexpr Pair half_pi = {std::numbers::pi / 2, 6.123233995736766e-17};
 
 /// Everything about a shape that does not depend on x.
-struct Shape {
+struct Eq14Shape {
   Pair alpha;
   double sigma = 0;
   double one_minus_sigma = 0;
@@ -49,7 +49,7 @@ Pair root(int k) {
   return {hi, (c - hi) + (c_lo + delta)};
 }
 
-Shape make_shape(int k) {
+Eq14Shape make_shape(int k) {
   require(k >= 1, "eq14: the mode number must be 1 or more, got " + std::to_string(k));
   const Pair a = root(k);
   const double e = std::exp(-a.hi) * (1 - a.lo);
@@ -71,7 +71,7 @@ struct Terms {
   double sine;
 };
 
-Terms terms(const Shape& s, double x) {
+Terms terms(const Eq14Shape& s, double x) {
   const double y = s.alpha.hi * x;
   const double y_lo = std::fma(s.alpha.hi, x, -y) + s.alpha.lo * x;
   // (1 - sigma) e^y = beta e^-(alpha - y): the growing exponential is measured from the tip and never exceeds 1.
@@ -171,19 +171,19 @@ double sigma(int k) { return make_shape(k).sigma; }
 double one_minus_sigma(int k) { return make_shape(k).one_minus_sigma; }
 
 double phi(int k, double x) {
-  const Shape s = make_shape(k);
+  const Eq14Shape s = make_shape(k);
   const Terms t = terms(s, x);
   return t.decay + t.sinh_part - t.cosine + s.sigma * t.sine;
 }
 
 double dphi(int k, double x) {
-  const Shape s = make_shape(k);
+  const Eq14Shape s = make_shape(k);
   const Terms t = terms(s, x);
   return s.alpha.hi * (-t.decay + t.cosh_part + t.sine + s.sigma * t.cosine);
 }
 
 double ddphi(int k, double x) {
-  const Shape s = make_shape(k);
+  const Eq14Shape s = make_shape(k);
   const Terms t = terms(s, x);
   return s.alpha.hi * s.alpha.hi * (t.decay + t.sinh_part + t.cosine - s.sigma * t.sine);
 }
@@ -196,7 +196,7 @@ double phi_as_printed(int k, double x) {
 }
 
 double integral_phi(int k) {
-  const Shape s = make_shape(k);
+  const Eq14Shape s = make_shape(k);
   return 2 * s.sigma / s.alpha.hi;
 }
 

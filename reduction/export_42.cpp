@@ -17,7 +17,7 @@ using Eigen::Index;
 using Eigen::Matrix3Xd;
 using Eigen::MatrixXd;
 
-constexpr ExportSetting settings[] = {
+constexpr ExportSetting settings_of_42[] = {
     {"joints", "text:", "joints that touch this body beside its inner one: INDEX=MARKER, ..."},
     {"spring", "number:0", "torsion spring of the inner joint [N m/rad]"},
     {"damper", "number:0", "its damper [N m s/rad]"},
@@ -53,7 +53,7 @@ std::vector<Node42> joints_of(const ReducedBody& body, std::string_view list) {
 }
 
 /// Lines of 42: values, then a comment; the reader keeps 79 characters of a comment or heading.
-class Writer {
+class Writer42 {
  public:
   void heading(std::string_view text) { line(fmt::format("{:*^64}", fmt::format("  {}  ", text))); }
   void line(std::string_view text) { (text_ += text) += '\n'; }
@@ -89,7 +89,7 @@ class NonZeros {
 
   explicit NonZeros(std::string_view comment) : comment_(comment) {}
 
-  void write(Writer& w, std::string_view title) {
+  void write(Writer42& w, std::string_view title) {
     w.heading(title);
     w.values("Number of non-zero elements", count_);
     if (!lines_.empty()) w.line(std::string_view(lines_).substr(0, lines_.size() - 1));
@@ -101,7 +101,7 @@ class NonZeros {
   Index count_ = 0;
 };
 
-void write_shapes(Writer& w, const std::vector<Node42>& nodes, bool joints) {
+void write_shapes(Writer42& w, const std::vector<Node42>& nodes, bool joints) {
   const std::string comment = joints ? "[Mode] [Joint] [Axis] Value" : "[Mode] [Node] [Axis] Value";
   for (const bool rotation : {false, true}) {
     NonZeros entries(comment);
@@ -117,7 +117,7 @@ void write_shapes(Writer& w, const std::vector<Node42>& nodes, bool joints) {
   }
 }
 
-void write_matrix(Writer& w, const MatrixXd& A, std::string_view title) {
+void write_matrix(Writer42& w, const MatrixXd& A, std::string_view title) {
   NonZeros entries("[Row] [Col] Value");
   for (Index i = 0; i < A.rows(); ++i) {
     for (Index j = 0; j < A.cols(); ++j) entries.add(A(i, j), i, j);
@@ -127,7 +127,7 @@ void write_matrix(Writer& w, const MatrixXd& A, std::string_view title) {
 
 std::string flex_text(const File42& file, const ReducedBody& body) {
   const Index n = file.Mf.rows();
-  Writer w;
+  Writer42 w;
   w.line("<<<<<<<<<<<<<<  Flexible Body Inputs for 42  >>>>>>>>>>>>>>>>>>>");
   w.line(fmt::format("{}, SI units, {} frame  ! Description", plain_name(body.name).substr(0, 30), body.frame));
   w.values("Number of Flex Modes", n);
@@ -164,7 +164,7 @@ std::string flex_text(const File42& file, const ReducedBody& body) {
 }
 
 std::string nodes_text(const File42& file, const std::string& name) {
-  Writer w;
+  Writer42 w;
   w.line("<<<<<<<<<<<<<<<<  Body Node Inputs for 42  >>>>>>>>>>>>>>>>>>>>>");
   w.line(fmt::format("{}  ! Description", name));
   w.values("Number of Nodes", std::ssize(file.nodes));
@@ -177,7 +177,7 @@ std::string nodes_text(const File42& file, const std::string& name) {
 }
 
 std::string joint_text(const PassiveJoint42& joint, const std::string& name, double stop_stiffness, double stop_angle) {
-  Writer w;
+  Writer42 w;
   w.line("<<<<<<<<<<<<<<  Passive Joint Parameters for 42  >>>>>>>>>>>>>>>");
   w.line(fmt::format("Inner joint of {}  ! Description", name));
   w.heading("Linear springs and dampers, zero at joint angle zero");
@@ -195,7 +195,7 @@ std::string joint_text(const PassiveJoint42& joint, const std::string& name, dou
 }
 
 std::string block_text(const File42& file, const std::string& name) {
-  Writer w;
+  Writer42 w;
   w.heading("Lines for the spacecraft file of 42");
   w.line("GAUSS_ELIM  ! Solve Dynamics by GAUSS_ELIM (ORDER_N refuses flex)");
   w.line(fmt::format("{}  ! Mass Props referenced to REFPT_CM or REFPT_JOINT",
@@ -232,7 +232,7 @@ std::string name_in_files(const std::filesystem::path& folder) {
 
 }  // namespace
 
-std::span<const ExportSetting> settings_42() { return settings; }
+std::span<const ExportSetting> settings_42() { return settings_of_42; }
 
 File42 file_42(const ReducedBody& body, const ExportOptions& options) {
   require(body.frame == "clamped" || body.frame == "mean-axis",
@@ -246,7 +246,7 @@ File42 file_42(const ReducedBody& body, const ExportOptions& options) {
   file.about_centre = body.frame == "mean-axis";
   file.inertia = body.J0;
   if (file.about_centre) file.inertia -= centre_inertia(body.m, body.mc0);
-  file.joints = joints_of(body, setting(settings, options, "joints"));
+  file.joints = joints_of(body, setting(settings_of_42, options, "joints"));
   for (const Marker& m : body.markers) file.nodes.push_back(node_of(m));
   file.Mf = body.Me;
   file.Kf = body.Ke;
@@ -258,8 +258,8 @@ File42 file_42(const ReducedBody& body, const ExportOptions& options) {
     file.N.emplace_back();
     for (Index l = 0; l < n; ++l) file.N.back().emplace_back(raw.S_S(k, l));
   }
-  file.joint.rotation_spring.x() = number_setting(settings, options, "spring");
-  file.joint.rotation_damper.x() = number_setting(settings, options, "damper");
+  file.joint.rotation_spring.x() = number_setting(settings_of_42, options, "spring");
+  file.joint.rotation_damper.x() = number_setting(settings_of_42, options, "damper");
   return file;
 }
 
@@ -269,8 +269,8 @@ void write_42(const ReducedBody& body, const ExportOptions& options, const std::
   write_file(folder / fmt::format("Flex_{}.txt", name), flex_text(file, body));
   write_file(folder / fmt::format("Nodes_{}.txt", name), nodes_text(file, name));
   write_file(folder / fmt::format("Joint_{}.txt", name),
-             joint_text(file.joint, name, number_setting(settings, options, "stop_stiffness"),
-                        number_setting(settings, options, "stop_angle")));
+             joint_text(file.joint, name, number_setting(settings_of_42, options, "stop_stiffness"),
+                        number_setting(settings_of_42, options, "stop_angle")));
   write_file(folder / fmt::format("Block_{}.txt", name), block_text(file, name));
 }
 

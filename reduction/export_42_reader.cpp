@@ -15,9 +15,9 @@ using Eigen::Vector3d;
 constexpr Index most_modes = 2000;  // N has 9 n^2 entries
 
 /// A file of 42, line by line: values, then a comment; blank lines do not count.
-class Lines {
+class Lines42 {
  public:
-  explicit Lines(const std::filesystem::path& path) : bytes_(file_bytes(path)), text_(bytes_, path.string()) {}
+  explicit Lines42(const std::filesystem::path& path) : bytes_(file_bytes(path)), text_(bytes_, path.string()) {}
 
   std::string_view next() {
     while (const auto line = text_.next_line()) {
@@ -91,7 +91,7 @@ class Lines {
 };
 
 void read_block(File42& file, const std::filesystem::path& path) {
-  Lines lines(path);
+  Lines42 lines(path);
   lines.skip(2);
   file.about_centre = lines.words(1)[0] == "REFPT_CM";
   lines.skip(3);
@@ -104,7 +104,7 @@ void read_block(File42& file, const std::filesystem::path& path) {
 }
 
 void read_nodes(File42& file, const std::filesystem::path& path) {
-  Lines lines(path);
+  Lines42 lines(path);
   lines.skip(2);
   const Index nodes = lines.count();
   lines.skip(1);
@@ -123,14 +123,14 @@ Node42& joint_of(File42& file, Index joint, Index n) {
   return file.joints.back();
 }
 
-MatrixXd matrix(Lines& lines, Index n) {
+MatrixXd matrix(Lines42& lines, Index n) {
   MatrixXd A = MatrixXd::Zero(n, n);
   lines.non_zeros(2, [&](const auto& w, double v) { A(lines.index(w[0], 0, n - 1), lines.index(w[1], 0, n - 1)) = v; });
   return A;
 }
 
 void read_flex(File42& file, const std::filesystem::path& path) {
-  Lines lines(path);
+  Lines42 lines(path);
   lines.skip(2);
   const Index n = lines.index(lines.words(1)[0], 0, most_modes);
   lines.skip(1);
@@ -177,7 +177,7 @@ File42 read_42(const std::filesystem::path& folder) {
   read_block(file, folder / fmt::format("Block_{}.txt", name));
   read_nodes(file, folder / fmt::format("Nodes_{}.txt", name));
   read_flex(file, folder / fmt::format("Flex_{}.txt", name));
-  Lines joint(folder / fmt::format("Joint_{}.txt", name));
+  Lines42 joint(folder / fmt::format("Joint_{}.txt", name));
   joint.skip(3);
   file.joint = {joint.vector(), joint.vector(), joint.vector(), joint.vector()};
   return file;

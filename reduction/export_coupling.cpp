@@ -18,7 +18,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Json = nlohmann::ordered_json;
 
-constexpr std::string_view format_name = "flexboom-coupling-1";
+constexpr std::string_view coupling_format = "flexboom-coupling-1";
 
 /// Rows of a matrix; a column becomes a flat array.
 Json rows(const MatrixXd& A) {
@@ -62,7 +62,7 @@ MatrixXd rigid_mass(double m, const Eigen::Vector3d& mc0, const Eigen::Matrix3d&
 
 Json json_of(const CouplingFile& file) {
   Json json;
-  json["format"] = format_name;
+  json["format"] = coupling_format;
   json["body"] = file.name;
   json["frame"] = file.frame;
   json["units"] = "SI; kg, m, s, rad; coordinates of unit modal mass";
@@ -89,7 +89,7 @@ Json json_of(const CouplingFile& file) {
 }
 
 CouplingFile file_of(const Json& json) {
-  require(json.value("format", "") == format_name, fmt::format("\"format\" must be \"{}\"", format_name));
+  require(json.value("format", "") == coupling_format, fmt::format("\"format\" must be \"{}\"", coupling_format));
   CouplingFile file;
   file.name = json.at("body").get<std::string>();
   file.frame = json.at("frame").get<std::string>();

@@ -18,7 +18,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr ExportSetting settings[] = {
+constexpr ExportSetting settings_of_mbdyn[] = {
     {"invariants", "points|groups|no",
      "as mass points (record group 11), which every MBDyn sums up; as record groups 14 to 18, at which 1.7.3 stops"},
     {"stiffening", "no|yes", "record group 19, for an MBDyn that reads it: the public sources up to 2022 stop at it"},
@@ -80,7 +80,7 @@ void set_stiffening(MbdynFile& file, const ReducedBody& body) {
 }
 
 /// Text of a file, record group by record group.
-class Writer {
+class MbdynWriter {
  public:
   void group(int number, std::string_view title) { line(fmt::format("**\n** RECORD GROUP {}, {}", number, title)); }
   void line(std::string_view text) { (text_ += text) += '\n'; }
@@ -105,7 +105,7 @@ class Writer {
 
 std::string text_of(const MbdynFile& file, const ReducedBody& body) {
   const Index n = file.mass.rows();
-  Writer w;
+  MbdynWriter w;
   w.line(fmt::format("** {}: reduced body of {}, SI units, axes and origin of the modal node", plain_name(body.name),
                      body.provenance.program.empty() ? "flexboom" : body.provenance.program));
   w.group(1, "HEADER");
@@ -194,14 +194,14 @@ std::string template_of(const MbdynFile& file, const std::string& name, const st
 
 }  // namespace
 
-std::span<const ExportSetting> mbdyn_settings() { return settings; }
+std::span<const ExportSetting> mbdyn_settings() { return settings_of_mbdyn; }
 
 MbdynFile mbdyn_file(const ReducedBody& body, const ExportOptions& options) {
   require(!body.markers.empty(), fmt::format("body \"{}\" has no markers: an MBDyn file needs one node or more, to "
                                              "which other bodies are joined",
                                              body.name));
-  const std::string invariants = setting(settings, options, "invariants");
-  const bool stiffening = setting(settings, options, "stiffening") == "yes";
+  const std::string invariants = setting(settings_of_mbdyn, options, "invariants");
+  const bool stiffening = setting(settings_of_mbdyn, options, "stiffening") == "yes";
   MbdynFile file;
   file.positions.resize(3, static_cast<Index>(body.markers.size()));
   std::set<std::string> used;

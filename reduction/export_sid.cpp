@@ -19,7 +19,7 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-constexpr ExportSetting settings[] = {
+constexpr ExportSetting settings_of_sid[] = {
     {"m1", "row-mode-column|row-column-mode", "indices of first-order entries: EMBSlib, samples | welib"},
     {"Oe", "xy-yz-xz|xy-xz-yz", "columns 4 to 6 of Oe: EMBSlib, samples | parts of welib"},
     {"Ge", "mode|component", "three columns per mode (EMBSlib, welib) | n per component (sample files)"},
@@ -146,17 +146,18 @@ std::string comment_of(const ReducedBody& body) {
 
 }  // namespace
 
-std::span<const ExportSetting> sid_settings() { return settings; }
+std::span<const ExportSetting> sid_settings() { return settings_of_sid; }
 
 SidDialect sid_dialect(const ExportOptions& options) {
-  return {.mode_before_column = setting(settings, options, "m1") == "row-mode-column",
-          .Oe_xz_last = setting(settings, options, "Oe") == "xy-yz-xz",
-          .Ge_by_mode = setting(settings, options, "Ge") == "mode",
-          .J_as_column = setting(settings, options, "J") == "6x1"};
+  return {.mode_before_column = setting(settings_of_sid, options, "m1") == "row-mode-column",
+          .Oe_xz_last = setting(settings_of_sid, options, "Oe") == "xy-yz-xz",
+          .Ge_by_mode = setting(settings_of_sid, options, "Ge") == "mode",
+          .J_as_column = setting(settings_of_sid, options, "J") == "6x1"};
 }
 
 SidFile sid_file(const ReducedBody& given, const ExportOptions& options) {
-  const ReducedBody body = setting(settings, options, "modal_mass") == "unit" ? with_unit_modal_mass(given) : given;
+  const ReducedBody body =
+      setting(settings_of_sid, options, "modal_mass") == "unit" ? with_unit_modal_mass(given) : given;
   SidFile sid;
   sid.mass = body.m;
   for (const Coordinate& c : body.coordinates) {
@@ -166,7 +167,7 @@ SidFile sid_file(const ReducedBody& given, const ExportOptions& options) {
   for (size_t i = 0; i < body.markers.size(); ++i) {
     sid.nodes.push_back(node_of(body, body.markers[i], static_cast<int>(i) + 1));
   }
-  set_integrals(sid, body, setting(settings, options, "Gr") == "1");
+  set_integrals(sid, body, setting(settings_of_sid, options, "Gr") == "1");
   sid.Me = constant(body.Me);
   sid.Ke = constant(body.Ke);
   sid.De = constant(body.De);

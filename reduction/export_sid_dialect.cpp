@@ -55,9 +55,9 @@ MatrixXd square_of(const MatrixXd& column) {
 }
 
 /// Lines of a SID file: keys at an indentation, "=" in column 49.
-class Writer {
+class SidWriter {
  public:
-  Writer(const SidDialect& dialect, Index modes) : dialect_(dialect), modes_(modes) {}
+  SidWriter(const SidDialect& dialect, Index modes) : dialect_(dialect), modes_(modes) {}
 
   void line(int indent, std::string_view text) { (text_.append(static_cast<size_t>(indent), ' ') += text) += '\n'; }
 
@@ -140,7 +140,7 @@ SidFile from_dialect(SidFile sid, const SidDialect& dialect) {
 
 std::string sid_text(const SidFile& sid, const SidDialect& dialect, const std::string& comment) {
   const auto n = static_cast<Index>(sid.modes.size());
-  Writer w(dialect, n);
+  SidWriter w(dialect, n);
   w.line(0, fmt::format("{:5}{:5}   :{}", sid.nodes.size(), n, comment));
   w.line(0, "part");
   w.line(6, "new modal");

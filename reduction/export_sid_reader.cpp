@@ -18,9 +18,9 @@ struct Line {
   std::string_view value;
 };
 
-class Reader {
+class SidReader {
  public:
-  Reader(std::string_view text, const std::string& file, const SidDialect& dialect)
+  SidReader(std::string_view text, const std::string& file, const SidDialect& dialect)
       : text_(text, file), dialect_(dialect) {}
 
   SidFile file() {
@@ -208,7 +208,7 @@ class Reader {
 SidFile read_sid(const std::filesystem::path& path, const ExportOptions& options) {
   const std::string bytes = file_bytes(path);
   const SidDialect dialect = sid_dialect(options);
-  return Reader(bytes, path.string(), dialect).file();
+  return SidReader(bytes, path.string(), dialect).file();
 }
 
 }  // namespace flexboom

@@ -45,9 +45,9 @@ MatrixXd stacked(const Eigen::Matrix3Xd& top, const Eigen::Matrix3Xd& bottom) {
   return C;
 }
 
-class CheckList {
+class ExportChecks {
  public:
-  explicit CheckList(double tolerance) : tolerance_(tolerance) {}
+  explicit ExportChecks(double tolerance) : tolerance_(tolerance) {}
 
   /// Largest deviation, relative to `scale`.
   void compare(const std::string& name, const MatrixXd& A, const MatrixXd& B, double scale) {
@@ -194,7 +194,7 @@ ExportReport export_body(const ReducedBody& body, std::string_view format, const
 }
 
 std::vector<BodyCheck> check_read_back(const ReducedBody& body, const ReadBack& file, double tolerance) {
-  CheckList list(tolerance);
+  ExportChecks list(tolerance);
   const double inertia = body.J0.cwiseAbs().maxCoeff();
   list.compare("m", MatrixXd::Constant(1, 1, file.m), MatrixXd::Constant(1, 1, body.m), body.m);
   list.compare("m c", file.mc0, body.mc0, std::sqrt(body.m * inertia));

@@ -1,6 +1,7 @@
 #include "reduction/reduced_body.hpp"
 
 #include "fem/check.hpp"
+#include "fem/round_off.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -14,7 +15,6 @@ namespace flexboom {
 namespace {
 
 /// Round-off allowed in a quantity built from sums over many points.
-constexpr double round_off = 1e-12;
 
 class Checker {
  public:
@@ -39,7 +39,7 @@ class Checker {
   }
 
   void symmetric(const Eigen::MatrixXd& A, const std::string& field) const {
-    check((A - A.transpose()).norm() <= round_off * A.norm(), field, "must be symmetric");
+    check((A - A.transpose()).norm() <= relative_round_off * A.norm(), field, "must be symmetric");
   }
 
  private:
@@ -58,7 +58,7 @@ void validate_rigid_part(const ReducedBody& body, const Checker& c) {
       body.J0 - body.m * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
   const Eigen::Vector3d principal =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(about_centre, Eigen::EigenvaluesOnly).eigenvalues();
-  const double slack = round_off * body.J0.norm();
+  const double slack = relative_round_off * body.J0.norm();
   c.check(principal(0) >= -slack, "J0",
           "is not an inertia: negative principal moment about the mass centre " + std::to_string(principal(0)));
   c.check(principal(2) <= principal(0) + principal(1) + slack, "J0",

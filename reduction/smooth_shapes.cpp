@@ -52,22 +52,22 @@ struct BodyAxes {
 /// Motion along the body.
 enum class Family { bending_1, bending_2, twist, stretching };
 
-struct Shape {
+struct SmoothShape {
   Family family;
   int degree;
 };
 
-constexpr std::array<Shape, 8> shapes = {{{Family::bending_1, 0},
-                                          {Family::bending_2, 0},
-                                          {Family::twist, 0},
-                                          {Family::stretching, 0},
-                                          {Family::bending_1, 1},
-                                          {Family::bending_2, 1},
-                                          {Family::bending_1, 2},
-                                          {Family::bending_2, 2}}};
+constexpr std::array<SmoothShape, 8> shapes = {{{Family::bending_1, 0},
+                                                {Family::bending_2, 0},
+                                                {Family::twist, 0},
+                                                {Family::stretching, 0},
+                                                {Family::bending_1, 1},
+                                                {Family::bending_2, 1},
+                                                {Family::bending_1, 2},
+                                                {Family::bending_2, 2}}};
 
 /// Displacement at r from the centre. Cross-sections turn with the slope, as those of a slender beam.
-Vector3d displacement(const BodyAxes& body, const Shape& shape, const Vector3d& r) {
+Vector3d displacement(const BodyAxes& body, const SmoothShape& shape, const Vector3d& r) {
   const Vector3d along = body.axes.col(0);
   const Legendre p = legendre(shape.degree, along.dot(r) / body.half_length);
   if (shape.family == Family::twist) return along.cross(r) / body.half_width * p.value;

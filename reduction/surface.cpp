@@ -163,8 +163,7 @@ Surface surface_of(const Mesh& mesh) {
     }
   }
   std::ranges::sort(surface.nodes);
-  const auto repeated = std::ranges::unique(surface.nodes);
-  surface.nodes.erase(repeated.begin(), repeated.end());
+  surface.nodes.erase(std::unique(surface.nodes.begin(), surface.nodes.end()), surface.nodes.end());
   for (std::array<int, 3>& triangle : surface.triangles) {
     for (int& node : triangle)
       node = static_cast<int>(std::ranges::lower_bound(surface.nodes, node) - surface.nodes.begin());
