@@ -18,10 +18,9 @@ using spatial::Vec3;
 
 namespace {
 
-template <class Pack>
-auto pack_columns(const Eigen::Matrix3Xd& m, Pack pack) {
+std::vector<Vec3<double>> pack_columns(const Eigen::Matrix3Xd& m) {
   std::vector<Vec3<double>> r;
-  for (Eigen::Index k = 0; k < m.cols(); ++k) r.push_back(pack(m.col(k)));
+  for (Eigen::Index k = 0; k < m.cols(); ++k) r.push_back(vec3(m.col(k)));
   return r;
 }
 
@@ -65,26 +64,33 @@ bool is_diagonal(const MatrixXd& m) {
 
 }  // namespace
 
-void pack_invariants(const ReducedBody& b, equations::Body& r) {
-  const auto to_vec = [](const auto& c) { return vec3(c); };
+void pack_integrals(const ReducedBody& b, equations::Body& r) {
   r.n = b.n();
   r.m = b.m;
   r.mc0 = vec3(b.mc0);
   r.J0 = spatial::sym3(b.J0);
-  r.Ct = pack_columns(b.Ct, to_vec);
-  r.Cr0 = pack_columns(b.Cr0, to_vec);
+  r.Ct = pack_columns(b.Ct);
+  r.Cr0 = pack_columns(b.Cr0);
   r.J1 = non_zeros(r.n, 1, 6, [&](size_t k, int, int c) { return symmetric_entry(b.J1[k], c); });
   r.J2 = non_zeros(r.n, r.n, 6,
                    [&](size_t k, int l, int c) { return symmetric_entry(b.J2[k][static_cast<size_t>(l)], c); });
   r.Cr1 = non_zeros(r.n, r.n, 3, [&](size_t k, int l, int c) { return b.Cr1[k](c, l); });
+}
+
+void pack_structure(const ReducedBody& b, equations::Body& r) {
   r.Ke = row_major(b.Ke);
   r.De = row_major(b.De);
   r.Me = row_major(b.Me);
   r.diagonal = is_diagonal(b.Ke) && is_diagonal(b.De) && is_diagonal(b.Me);
   const MatrixXd Me_inverse = r.n ? MatrixXd(b.Me.llt().solve(MatrixXd::Identity(r.n, r.n))) : MatrixXd(0, 0);
   r.Me_inverse = row_major(0.5 * (Me_inverse + Me_inverse.transpose()));
-  r.Gt = pack_columns(b.Ct * Me_inverse, to_vec);
+  r.Gt = pack_columns(b.Ct * Me_inverse);
   r.Ctt = r.n ? spatial::sym3(b.Ct * Me_inverse * b.Ct.transpose()) : spatial::Sym3<double>{};
+}
+
+void pack_invariants(const ReducedBody& b, equations::Body& r) {
+  pack_integrals(b, r);
+  pack_structure(b, r);
 }
 
 std::vector<equations::Term> packed_vector_family(const std::vector<MatrixXd>& components) {
@@ -93,56 +99,6 @@ std::vector<equations::Term> packed_vector_family(const std::vector<MatrixXd>& c
   return non_zeros(n, n, static_cast<int>(components.size()),
                    [&](size_t k, int l, int c) { return components[static_cast<size_t>(c)](static_cast<int>(k), l); });
 }
-
-namespace {
-
-/// Components along other axes of a vector of matrices.
-std::vector<MatrixXd> rotated(const std::vector<MatrixXd>& v, const Matrix3d& axes) {
-  std::vector<MatrixXd> r = v;
-  for (size_t i = 0; i < v.size(); ++i) {
-    r[i].setZero();
-    for (size_t j = 0; j < v.size(); ++j) r[i] += axes(static_cast<int>(j), static_cast<int>(i)) * v[j];
-  }
-  return r;
-}
-
-constexpr int row_of[] = {0, 1, 2, 0, 1, 2}, column_of[] = {0, 1, 2, 1, 2, 0};
-
-/// Entry k, l of the inertia that stands for Kg.spin: w^T J2 w q_l = -(sum w_i w_j Kg.spin q)_k.
-Matrix3d inertia_of_spin(const std::vector<MatrixXd>& spin, int k, int l) {
-  Matrix3d J;
-  for (size_t c = 0; c < 6; ++c)
-    J(row_of[c], column_of[c]) = J(column_of[c], row_of[c]) = (c < 3 ? -1.0 : -0.5) * spin[c](k, l);
-  return J;
-}
-
-Vector3d entry(const std::vector<MatrixXd>& v, int k, int l) { return {v[0](k, l), v[1](k, l), v[2](k, l)}; }
-
-/// Kg of a frame with its origin at d: u0 becomes u0 - d.
-GeometricStiffness seen_from(const GeometricStiffness& Kg, const Vector3d& d, const Matrix3d& axes) {
-  GeometricStiffness r = Kg;
-  if (!Kg.spin.empty()) {
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, k = (i + 2) % 3;
-      r.angular_acceleration[static_cast<size_t>(i)] -=
-          d[j] * Kg.acceleration[static_cast<size_t>(k)] - d[k] * Kg.acceleration[static_cast<size_t>(j)];
-    }
-    const Matrix3d td = tilde(d);
-    const auto n = static_cast<int>(Kg.spin[0].rows());
-    for (int k = 0; k < n; ++k)
-      for (int l = 0; l < n; ++l) {
-        const Matrix3d ta = tilde(entry(Kg.acceleration, k, l));
-        const Matrix3d J = axes.transpose() * (inertia_of_spin(Kg.spin, k, l) + 0.5 * (td * ta + ta * td)) * axes;
-        for (size_t c = 0; c < 6; ++c) r.spin[c](k, l) = (c < 3 ? -1.0 : -2.0) * J(row_of[c], column_of[c]);
-      }
-    r.acceleration = rotated(r.acceleration, axes);
-    r.angular_acceleration = rotated(r.angular_acceleration, axes);
-  }
-  for (MarkerStiffness& m : r.markers) m.force = rotated(m.force, axes), m.torque = rotated(m.torque, axes);
-  return r;
-}
-
-}  // namespace
 
 ReducedBody seen_from(const ReducedBody& b, const Vector3d& d, const Matrix3d& axes) {
   const Matrix3d to = axes.transpose(), td = tilde(d);
@@ -164,7 +120,6 @@ ReducedBody seen_from(const ReducedBody& b, const Vector3d& d, const Matrix3d& a
     for (const Matrix3d& J : b.J2[k]) r.J2[k].emplace_back(to * J * axes);
   }
   r.Me = b.Me, r.Ke = b.Ke, r.De = b.De;
-  r.Kg = seen_from(b.Kg, d, axes);
   r.coordinates = b.coordinates;
   for (Marker m : b.markers) {
     m.position = to * (m.position - d);
@@ -173,13 +128,6 @@ ReducedBody seen_from(const ReducedBody& b, const Vector3d& d, const Matrix3d& a
     r.markers.push_back(std::move(m));
   }
   return r;
-}
-
-void add_second_order_inertia(ReducedBody& b) {
-  if (b.Kg.spin.empty()) return;
-  for (int k = 0; k < b.n(); ++k)
-    for (int l = 0; l < b.n(); ++l)
-      b.J2[static_cast<size_t>(k)][static_cast<size_t>(l)] += inertia_of_spin(b.Kg.spin, k, l);
 }
 
 }  // namespace flexboom

@@ -169,23 +169,34 @@ Inertia<T> inertia_at(const BodyOf<C>& body, const T* q, const T* q_dot, BodyScr
   return r;
 }
 
-/// Modal forces Q_f - Ke q - De q_dot (FORMULATION 3.1) of one body with angular velocity w in its own axes.
+/// Forces of structure and damping, -Ke q - De q_dot.
 template <class C, class T>
-void modal_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q, const T* q_dot, BodyScratch<T>& s) {
+void elastic_forces(const BodyOf<C>& body, const T* q, const T* q_dot, T* b) {
   const auto n = static_cast<size_t>(body.n);
   for (size_t k = 0; k < n; ++k) {
     T f = T(0.0);
     for (size_t l = body.row_begin(k); l < body.row_end(k); ++l)
       f -= body.Ke[k * n + l] * q[l] + body.De[k * n + l] * q_dot[l];
-    s.b[k] = f;
+    b[k] = f;
   }
-  // 1/2 w^T dJ/dq_k w + 2 w . (Cr1[k] q_dot)
+}
+
+/// Adds the modal forces of the motion, 1/2 w^T dJ/dq_k w + 2 w . (Cr1[k] q_dot) (README, "Equations of motion"), of
+/// one body with angular velocity w in its own axes.
+template <class C, class T>
+void add_inertial_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q, const T* q_dot, T* b) {
   const T ww[] = {w.x * w.x, w.y * w.y, w.z * w.z, 2.0 * (w.x * w.y), 2.0 * (w.y * w.z), 2.0 * (w.z * w.x)};
-  for (const TermOf<C>& t : body.J1) s.b[static_cast<size_t>(t.k)] += (0.5 * t.value) * ww[t.component];
-  for (const TermOf<C>& t : body.J2) s.b[static_cast<size_t>(t.k)] += t.value * (q[t.l] * ww[t.component]);
+  for (const TermOf<C>& t : body.J1) b[t.k] += (0.5 * t.value) * ww[t.component];
+  for (const TermOf<C>& t : body.J2) b[t.k] += t.value * (q[t.l] * ww[t.component]);
   const T* const wi[] = {&w.x, &w.y, &w.z};
-  for (const TermOf<C>& t : body.Cr1)
-    s.b[static_cast<size_t>(t.k)] += (2.0 * t.value) * (*wi[t.component] * q_dot[t.l]);
+  for (const TermOf<C>& t : body.Cr1) b[t.k] += (2.0 * t.value) * (*wi[t.component] * q_dot[t.l]);
+}
+
+/// Both, to the scratch.
+template <class C, class T>
+void modal_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q, const T* q_dot, BodyScratch<T>& s) {
+  elastic_forces(body, q, q_dot, s.b.data());
+  add_inertial_forces(body, w, q, q_dot, s.b.data());
 }
 
 /// Adds gravity to force, torque and modal forces (`s.b`) of one body in its own axes: m a + G mc, mc x a + axial(G J),
@@ -231,7 +242,7 @@ void condense(const BodyOf<C>& body, const Vec3<T>& w_hub, const T* p, const T* 
   const Inertia<T> inertia = inertia_at(body, q, q_dot, s);
   modal_forces(body, w, q, q_dot, s);
 
-  // Forces less the mass matrix times the bias accelerations (FORMULATION 3, 3.1).
+  // Forces less the mass matrix times the bias accelerations (README, "Equations of motion").
   Vec3<T> Ct_rate{}, Cr_rate{};
   for (size_t k = 0; k < n; ++k) {
     Ct_rate += q_dot[k] * body.Ct[k];

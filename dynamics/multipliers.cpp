@@ -1,8 +1,8 @@
 #include "dynamics/multipliers.hpp"
 
-#include "dynamics/body_constants.hpp"
 #include "dynamics/multipliers_start.hpp"
 #include "dynamics/rotation.hpp"
+#include "dynamics/second_order_shapes.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
@@ -35,28 +35,32 @@ std::vector<Entry> entries_of(const std::vector<Eigen::MatrixXd>& K, double fact
 }  // namespace
 
 BodyData body_data(const ReducedBody& body, Stiffening stiffening) {
-  const bool second_order = stiffening == Stiffening::on && body.n() > 0;
-  require(!second_order || !body.Kg.spin.empty(),
-          fmt::format("body {}: its geometric stiffness is asked for but the reduced body has none", body.name));
-  ReducedBody b = body;
-  if (second_order) add_second_order_inertia(b);
-  const auto n = static_cast<size_t>(b.n());
-  BodyData d{n, b.m, spatial::vec3(b.mc0), spatial::sym3(b.J0), {}, {}, {}, {}, {}, {}, {}, b.Me, b.Ke, b.De};
+  const Index n = body.n();
+  BodyData d;
+  d.n = d.shapes = static_cast<size_t>(n);
+  d.Me = body.Me, d.Ke = body.Ke, d.De = body.De;
+  ReducedBody with_shapes;
+  const bool second_order = stiffening == Stiffening::on && n > 0;
   if (second_order) {
-    d.Ct_slope = entries_of(b.Kg.acceleration, 1);
-    d.Cr_slope = entries_of(b.Kg.angular_acceleration, 1);
+    SecondOrderShapes shapes = with_second_order_shapes(body);
+    d.follow = entries_of(shapes.follow, 1);
+    with_shapes = std::move(shapes.body);
+    d.shapes = static_cast<size_t>(with_shapes.n());
+    d.Me_follow = with_shapes.Me.bottomLeftCorner(with_shapes.n() - n, n);
   }
+  const ReducedBody& b = second_order ? with_shapes : body;
+  d.m = b.m, d.mc0 = spatial::vec3(b.mc0), d.J0 = spatial::sym3(b.J0);
   constexpr std::array<std::array<Index, 2>, 6> symmetric = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}}};
   const auto nonzeros = [&](const Matrix3d& M, size_t k, size_t l, std::vector<Entry>& out) {
     for (size_t c = 0; c < 6; ++c)
       if (const double v = M(symmetric[c][0], symmetric[c][1]); v != 0) out.push_back({k, l, c, v});
   };
-  for (size_t k = 0; k < n; ++k) {
+  for (size_t k = 0; k < d.shapes; ++k) {
     const auto column = static_cast<Index>(k);
     d.Ct.push_back(spatial::vec3(b.Ct.col(column)));
     d.Cr0.push_back(spatial::vec3(b.Cr0.col(column)));
     nonzeros(b.J1[k], k, k, d.J1);
-    for (size_t l = 0; l < n; ++l) {
+    for (size_t l = 0; l < d.shapes; ++l) {
       nonzeros(b.J2[k][l], k, l, d.J2);
       for (size_t c = 0; c < 3; ++c)
         if (const double v = b.Cr1[k](static_cast<Index>(c), static_cast<Index>(l)); v != 0)

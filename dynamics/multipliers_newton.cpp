@@ -185,11 +185,21 @@ MatrixXd Equations::mass(size_t i, const double* y) const {
   M.topLeftCorner<3, 3>() = body.m * Matrix3d::Identity();
   M.block<3, 3>(3, 0) = tilde(eigen(d.mc)) * A.transpose();
   M.block<3, 3>(3, 3) << d.J[0], d.J[3], d.J[5], d.J[3], d.J[1], d.J[4], d.J[5], d.J[4], d.J[2];
-  for (Index k = 0; k < at.n; ++k) {
-    M.block<1, 3>(6 + k, 0) = (A * eigen(d.Ct[static_cast<size_t>(k)])).transpose();
-    M.block<1, 3>(6 + k, 3) = eigen(d.Cr[static_cast<size_t>(k)]).transpose();
+  const auto r = static_cast<Index>(body.shapes) - at.n;
+  Eigen::Matrix3Xd Ct(3, at.n + r), Cr(3, at.n + r);
+  for (Index k = 0; k < at.n + r; ++k) {
+    Ct.col(k) = A * eigen(body.Ct[static_cast<size_t>(k)]);
+    Cr.col(k) = eigen(d.Cr[static_cast<size_t>(k)]);
   }
+  const Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> slope(d.slope.data(), r,
+                                                                                                at.n);
+  M.block(6, 0, at.n, 3) = (Ct.leftCols(at.n) + Ct.rightCols(r) * slope).transpose();
+  M.block(6, 3, at.n, 3) = (Cr.leftCols(at.n) + Cr.rightCols(r) * slope).transpose();
   M.bottomRightCorner(at.n, at.n) = body.Me;
+  if (r > 0) {
+    const MatrixXd mixed = body.Me_follow.transpose() * slope;
+    M.bottomRightCorner(at.n, at.n) += mixed + mixed.transpose() + body.m * slope.transpose() * slope;
+  }
   return M.selfadjointView<Eigen::Lower>();
 }
 

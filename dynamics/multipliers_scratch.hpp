@@ -16,14 +16,15 @@ struct BodyScratch {
   DeformedBody<Lanes> deformed_lanes;
   std::vector<Lanes> q, q_dot, on_q_lanes;
 
-  explicit BodyScratch(size_t n) : deformed(n), on_q(n), deformed_lanes(n), q(n), q_dot(n), on_q_lanes(n) {}
+  explicit BodyScratch(const BodyData& b)
+      : deformed(b), on_q(b.n), deformed_lanes(b), q(b.n), q_dot(b.n), on_q_lanes(b.n) {}
 };
 
 struct EquationScratch {
   std::vector<BodyScratch> bodies;
 
   explicit EquationScratch(const std::vector<BodyData>& data) {
-    for (const BodyData& b : data) bodies.emplace_back(b.n);
+    for (const BodyData& b : data) bodies.emplace_back(b);
   }
 };
 

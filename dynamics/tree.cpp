@@ -44,44 +44,77 @@ void set_instant(const Model& model, double t, Instant& instant) {
 
 namespace {
 
+constexpr double too_little = 1e-12;  // of an inertia: what is left of it is round-off
+
+/// Does freedom k of the link's joint move inertia?
+bool moves_inertia(const tree::Link& link, const tree::LinkScratch<double>& s, int k) {
+  const bool slides = joint_type(link.kind).freedom[static_cast<size_t>(k)] < Freedom::turn_x;
+  const double scale = slides ? link.body.m : link.body.J0.xx + link.body.J0.yy + link.body.J0.zz;
+  const double inverse_D = s.freedom[static_cast<size_t>(k)].inverse_D;
+  return inverse_D > 0 && too_little * scale * inverse_D < 1;
+}
+
+/// Is the mass matrix over the coordinates of the body positive definite?
+bool has_modal_mass(const tree::Link& link, const tree::LinkScratch<double>& s) {
+  if (!link.b.moves()) return !link.second_order || s.second_order.least_pivot > 0;
+  for (int k = 0; k < link.body.n; ++k)
+    if (!(s.M[static_cast<size_t>(k * (link.body.n + 1))] > 0)) return false;
+  return true;
+}
+
+/// What is wrong with the mass matrix at the body of a link; empty where nothing is.
+std::string mass_fault(const Multibody& scene, const tree::Link& link, const tree::LinkScratch<double>& s) {
+  const JointType& type = joint_type(link.kind);
+  const std::string& joint = scene.joints[static_cast<size_t>(link.joint)].name;
+  const std::string& body = scene.bodies[static_cast<size_t>(link.index)].name;
+  for (int k = 0; k < type.freedoms && link.kind != JointKind::free && !link.prescribed; ++k) {
+    if (moves_inertia(link, s, k)) continue;
+    const bool slides = type.freedom[static_cast<size_t>(k)] < Freedom::turn_x;
+    return fmt::format(
+        "joint {}: freedom {} of it moves an inertia of {:.3g} {}: too little to compute with; give body "
+        "{} inertia there, or fewer modes",
+        joint, k + 1, 1 / s.freedom[static_cast<size_t>(k)].inverse_D, slides ? "kg" : "kg m^2", body);
+  }
+  if (has_modal_mass(link, s)) return "";
+  return fmt::format("joint {}: the mass matrix of the coordinates of body {} is not positive definite", joint, body);
+}
+
 /// A joint must move inertia, else its acceleration is noise. At the state where all coordinates are zero.
 void check_inertia(const Tree& system, const tree::Model& model) {
   VectorXd y = system.pack(system.at_rest()), y_dot(y.size());
   const TreeWorkspaceHandle work = system.workspace();
-  const std::vector<char> open(system.scene().joints.size(), 0);
-  system.derivative(0, y.data(), open, *work, y_dot.data());
+  tree::set_instant(model, 0, work->instant);
+  tree::derivative(model, y.data(), work->instant, std::vector<char>(system.scene().joints.size(), 0), work->scratch,
+                   y_dot.data());
   for (size_t i = model.links.size(); i-- > 0;) {  // tips first: what is bad there spoils all before
     const tree::Link& link = model.links[i];
     const tree::LinkScratch<double>& s = work->scratch.links[i];
-    const JointType& type = joint_type(link.kind);
-    const std::string& joint = system.scene().joints[static_cast<size_t>(link.joint)].name;
-    const std::string& body = system.scene().bodies[static_cast<size_t>(link.index)].name;
-    const double trace = link.body.J0.xx + link.body.J0.yy + link.body.J0.zz;
-    if (link.kind == JointKind::free) {
-      const Matrix3d mass = spatial::eigen(s.I.tt), J = spatial::eigen(s.I.ww);
-      Matrix3d c;
-      for (int r = 0; r < 3; ++r) c.row(r) = spatial::eigen(s.I.tw.row[static_cast<size_t>(r)]).transpose();
-      const Matrix3d left = J - c.transpose() * mass.ldlt().solve(c);
-      const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>((left + left.transpose()) / 2).eigenvalues()(0);
-      require(
-          least > 1e-12 * J.trace() && mass.allFinite(),
-          fmt::format("joint {}: with everything on it, body {} has an inertia of {:.3g} of {:.3g} kg m^2 about one "
-                      "axis: too little to compute with",
-                      joint, body, std::max(0.0, least), J.trace()));
-    } else if (!link.prescribed) {
-      for (int k = 0; k < type.freedoms; ++k) {
-        const bool slides = type.freedom[static_cast<size_t>(k)] < Freedom::turn_x;
-        const double D = 1 / s.freedom[static_cast<size_t>(k)].inverse_D, scale = slides ? link.body.m : trace;
-        require(D > 1e-12 * scale && std::isfinite(D),
-                fmt::format("joint {}: freedom {} of it moves an inertia of {:.3g} of {:.3g} {}: too little to compute "
-                            "with; give body {} inertia there, or fewer modes",
-                            joint, k + 1, D, scale, slides ? "kg" : "kg m^2", body));
-      }
-    }
-    if (link.b.moves())
-      for (int k = 0; k < link.body.n; ++k)
-        require(s.M[static_cast<size_t>(k * (link.body.n + 1))] > 0,
-                fmt::format("joint {}: held at its marker, body {} has a coordinate without mass", joint, body));
+    const std::string fault = mass_fault(system.scene(), link, s);
+    require(fault.empty(), fault);
+    if (link.kind != JointKind::free) continue;
+    const Matrix3d mass = spatial::eigen(s.I.tt), J = spatial::eigen(s.I.ww);
+    Matrix3d c;
+    for (int r = 0; r < 3; ++r) c.row(r) = spatial::eigen(s.I.tw.row[static_cast<size_t>(r)]).transpose();
+    const Matrix3d left = J - c.transpose() * mass.ldlt().solve(c);
+    const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>((left + left.transpose()) / 2).eigenvalues()(0);
+    require(least > too_little * J.trace() && mass.allFinite(),
+            fmt::format("joint {}: with everything on it, body {} has an inertia of {:.3g} of {:.3g} kg m^2 about one "
+                        "axis: too little to compute with",
+                        system.scene().joints[static_cast<size_t>(link.joint)].name,
+                        system.scene().bodies[static_cast<size_t>(link.index)].name, std::max(0.0, least), J.trace()));
+  }
+}
+
+/// @throws NumericalError naming the first body, from the tips inwards, whose mass matrix is singular or indefinite.
+void check_mass(const tree::Model& model, double t, const double* y, int size, const tree::Scratch<double>& scratch) {
+  for (size_t i = model.links.size(); i-- > 0;) {
+    const tree::Link& link = model.links[i];
+    const tree::LinkScratch<double>& s = scratch.links[i];
+    bool sound = has_modal_mass(link, s);
+    if (link.kind != JointKind::free && !link.prescribed)
+      for (int k = 0; k < joint_type(link.kind).freedoms; ++k) sound = sound && moves_inertia(link, s, k);
+    if (sound || !Eigen::Map<const VectorXd>(y, size).allFinite()) continue;
+    throw NumericalError(fmt::format("t = {:.9g} s: {}", t, mass_fault(*model.scene, link, s)));
   }
 }
 
@@ -185,6 +218,7 @@ FLEXBOOM_INNER_LOOP
 void Tree::derivative(double t, const double* y, std::span<const char> contact, TreeWorkspace& w, double* y_dot) const {
   tree::set_instant(impl_->model, t, w.instant);
   tree::derivative(impl_->model, y, w.instant, contact, w.scratch, y_dot);
+  check_mass(impl_->model, t, y, impl_->layout.size, w.scratch);
 }
 
 }  // namespace flexboom

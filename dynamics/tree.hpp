@@ -106,6 +106,7 @@ class Tree {
   TreeWorkspaceHandle workspace() const;
 
   /// y_dot = f(t, y) with the stops of joints with contact[joint] closed. Allocates nothing.
+  /// @throws NumericalError naming the body where the mass matrix at y is singular to round-off.
   void derivative(double t, const double* y, std::span<const char> contact, TreeWorkspace&, double* y_dot) const;
 
   /// df/dy, exact by forward differentiation.

@@ -52,11 +52,12 @@ struct Totals {
     Vec3<double> P = link.body.m * v + cross(w, s.mc), H = cross(s.mc, v) + s.J * w;
     double modal = 0;
     for (size_t k = 0; k < n; ++k) {
-      const Vec3<double>& Ct = link.second_order ? s.Ct[k] : link.body.Ct[k];
+      const Vec3<double>& Ct = link.second_order ? s.second_order.Ct[k] : link.body.Ct[k];
       P += q_dot[k] * Ct;
       H += q_dot[k] * s.modes.Cr[k];
       double p = dot(Ct, v) + dot(s.modes.Cr[k], w);
-      for (size_t l = 0; l < n; ++l) p += link.body.Me[k * n + l] * q_dot[l];
+      const std::vector<double>& Me = link.second_order ? s.second_order.Me : link.body.Me;
+      for (size_t l = 0; l < n; ++l) p += Me[k * n + l] * q_dot[l];
       modal += q_dot[k] * p;
     }
     balance.kinetic += 0.5 * (dot(v, P) + dot(w, H) + modal);

@@ -16,9 +16,10 @@ void condense_held(const Link& link, LinkScratch<T>& s) {
   const auto n = static_cast<size_t>(b.n);
   HubSystem<T>& I = s.I;
   for (size_t k = 0; k < n; ++k) {
-    s.C[k] = {link.second_order ? s.Ct[k] : equations::lift<T>(b.Ct[k]), s.modes.Cr[k]};
+    s.C[k] = {link.second_order ? s.second_order.Ct[k] : equations::lift<T>(b.Ct[k]), s.modes.Cr[k]};
     s.v[k] = s.modes.b[k];
-    for (size_t l = 0; l < n; ++l) s.M[k * n + l] = T(b.Me[k * n + l]);
+    for (size_t l = 0; l < n; ++l)
+      s.M[k * n + l] = link.second_order ? s.second_order.Me[k * n + l] : T(b.Me[k * n + l]);
   }
   for (size_t i = 0; i < s.hung.size(); ++i) {
     const HubSystem<T>& W = s.hung[i];
@@ -86,11 +87,20 @@ void condense_link(const Link& link, const T* y, LinkScratch<T>& s, bool forces)
   if (link.b.moves()) {
     condense_held(link, s);
   } else if (link.second_order) {
-    eliminate_modes<false>(link.body, s.Ct, s.Gt, s);
-    if (link.slots) add_hung_children(link, s.Gt, s);
+    SecondOrderScratch<T>& o = s.second_order;
+    const auto n = static_cast<size_t>(link.body.n);
+    o.least_pivot = invert(n, o.Me, o.factor, o.Me_inverse);
+    const InverseOfMe<T> inverse = {o.Me_inverse.data(), n, false};
+    for (size_t k = 0; k < n; ++k) {
+      o.Gt[k] = Vec3<T>{};
+      for (size_t l = 0; l < n; ++l) o.Gt[k] += inverse.row(k)[l] * o.Ct[l];
+    }
+    eliminate_modes(inverse, o.Ct, o.Gt, nullptr, s);
+    if (link.slots) add_hung_children(link, inverse, o.Gt, s);
   } else {
-    eliminate_modes<true>(link.body, link.body.Ct, link.body.Gt, s);
-    if (link.slots) add_hung_children(link, link.body.Gt, s);
+    const InverseOfMe<double> inverse = inverse_of_Me(link.body);
+    eliminate_modes(inverse, link.body.Ct, link.body.Gt, &link.body.Ctt, s);
+    if (link.slots) add_hung_children(link, inverse, link.body.Gt, s);
   }
 }
 
@@ -228,7 +238,8 @@ void release_modes(const Link& link, LinkScratch<T>& s) {
     s.acceleration = s.handle;
     const Vec3<T> a = s.acceleration.t, alpha = s.acceleration.w;
     if (link.second_order)
-      for (size_t k = 0; k < n; ++k) s.q_ddot[k] = s.modes.g[k] - (dot(s.Gt[k], a) + dot(s.modes.Gw[k], alpha));
+      for (size_t k = 0; k < n; ++k)
+        s.q_ddot[k] = s.modes.g[k] - (dot(s.second_order.Gt[k], a) + dot(s.modes.Gw[k], alpha));
     else
       for (size_t k = 0; k < n; ++k) s.q_ddot[k] = s.modes.g[k] - (dot(link.body.Gt[k], a) + dot(s.modes.Gw[k], alpha));
     const std::array<T, 6> A = entries(s.acceleration);

@@ -4,6 +4,7 @@
 
 #include "dynamics/tree_scratch.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -56,6 +57,105 @@ void add_shifted(const Mat3<T>& A, const R& arm, const HubSystem<T>& I, HubSyste
                    a.row[0].y + b.row[1].x, a.row[1].z + b.row[2].y, a.row[2].x + b.row[0].z};
 }
 
+/// Q, Q_dot, Q_ddot and the slopes of a body with second-order displacements.
+template <class T>
+void follow_coordinates(const Link& link, const T* q, const T* q_dot, SecondOrderScratch<T>& s) {
+  const auto n = static_cast<size_t>(link.body.n), r = link.followers();
+  for (T& x : s.slope) x = T(0.0);
+  for (const Term& t : link.follow) {
+    const auto a = static_cast<size_t>(t.component), k = static_cast<size_t>(t.k);
+    s.slope[a * n + k] += t.value * q[t.l];
+  }
+  for (size_t k = 0; k < n; ++k) s.Q[k] = q[k], s.Q_dot[k] = q_dot[k];
+  for (size_t a = 0; a < r; ++a) {
+    T Q(0.0), Q_dot(0.0);
+    for (size_t k = 0; k < n; ++k) Q += s.slope[a * n + k] * q[k], Q_dot += s.slope[a * n + k] * q_dot[k];
+    s.Q[n + a] = 0.5 * Q, s.Q_dot[n + a] = Q_dot;
+    s.Q_ddot[a] = T(0.0);
+  }
+  for (const Term& t : link.follow) s.Q_ddot[static_cast<size_t>(t.component)] += t.value * (q_dot[t.k] * q_dot[t.l]);
+}
+
+/// The inverse of a symmetric positive definite matrix by L D L^T, n x n. Returns the least pivot over the element of
+/// the diagonal that it came from.
+template <class T>
+double invert(size_t n, const std::vector<T>& matrix, std::vector<T>& A, std::vector<T>& inverse) {
+  A = matrix;
+  double least = 1;
+  for (size_t j = 0; j < n; ++j) {  // L below the diagonal, 1/D on it; L D in rows to come
+    const double before = value_of(A[j * n + j]);
+    for (size_t k = 0; k < j; ++k) {
+      const T LD = A[j * n + k];
+      A[j * n + k] = LD * A[k * n + k];
+      A[j * n + j] -= LD * A[j * n + k];
+    }
+    least = std::min(least, value_of(A[j * n + j]) / before);
+    A[j * n + j] = T(1.0) / A[j * n + j];
+    for (size_t i = j + 1; i < n; ++i)
+      for (size_t k = 0; k < j; ++k) A[i * n + j] -= A[i * n + k] * A[j * n + k];
+  }
+  for (size_t c = 0; c < n; ++c) {  // column c from row c on; the rest is its mirror image
+    for (size_t i = c; i < n; ++i) {
+      T x(i == c ? 1.0 : 0.0);
+      for (size_t k = c; k < i; ++k) x -= A[i * n + k] * inverse[k * n + c];
+      inverse[i * n + c] = x;
+    }
+    for (size_t i = n; i-- > c;) {
+      T x = inverse[i * n + c] * A[i * n + i];
+      for (size_t k = i + 1; k < n; ++k) x -= A[k * n + i] * inverse[k * n + c];
+      inverse[i * n + c] = x;
+    }
+  }
+  for (size_t c = 0; c < n; ++c)
+    for (size_t i = 0; i < c; ++i) inverse[i * n + c] = inverse[c * n + i];
+  return least;
+}
+
+/// Forces on the body about its origin that its own motion causes, beside those of constant shapes.
+template <class T>
+struct BiasForce {
+  Vec3<T> t{}, w{};
+};
+
+/// Inertia, Ct(q), Cr(q), Me(q) and modal forces of a body with second-order displacements: those of all its shapes,
+/// projected on the coordinates that they follow. So its kinetic energy is a square.
+template <class T>
+equations::Inertia<T> second_order_body(const Link& link, const Vec3<T>& w, const T* q, const T* q_dot,
+                                        SecondOrderScratch<T>& s, equations::BodyScratch<T>& modes,
+                                        BiasForce<T>& bias) {
+  const auto n = static_cast<size_t>(link.body.n), r = link.followers();
+  follow_coordinates(link, q, q_dot, s);
+  const equations::Inertia<T> inertia = equations::inertia_at(link.shapes, s.Q.data(), s.Q_dot.data(), s.shapes);
+  equations::elastic_forces(link.body, q, q_dot, modes.b.data());
+  for (T& f : s.shapes.b) f = T(0.0);
+  equations::add_inertial_forces(link.shapes, w, s.Q.data(), s.Q_dot.data(), s.shapes.b.data());
+  for (size_t k = 0; k < n; ++k) {
+    s.Ct[k] = equations::lift<T>(link.shapes.Ct[k]);
+    modes.Cr[k] = s.shapes.Cr[k];
+    modes.b[k] += s.shapes.b[k];
+    for (size_t l = 0; l < n; ++l) s.Me[k * n + l] = T(link.body.Me[k * n + l]);
+  }
+  for (size_t a = 0; a < r; ++a) {
+    const Vec3<double>& Ct = link.shapes.Ct[n + a];
+    const Vec3<T>& Cr = s.shapes.Cr[n + a];
+    const T* slope = s.slope.data() + a * n;
+    const double *Me = link.Me_follow.data() + a * n, m = link.body.m;  // followers are orthogonal, mean square 1
+    const T force = s.shapes.b[n + a] - m * s.Q_ddot[a];
+    bias.t -= s.Q_ddot[a] * Ct;
+    bias.w -= s.Q_ddot[a] * Cr;
+    for (size_t k = 0; k < n; ++k) {
+      s.Ct[k] += slope[k] * Ct;
+      modes.Cr[k] += slope[k] * Cr;
+      modes.b[k] += slope[k] * force - Me[k] * s.Q_ddot[a];
+      const T whole = Me[k] + m * slope[k];
+      for (size_t l = 0; l <= k; ++l) s.Me[k * n + l] += whole * slope[l] + slope[k] * Me[l];
+    }
+  }
+  for (size_t k = 0; k < n; ++k)
+    for (size_t l = 0; l < k; ++l) s.Me[l * n + k] = s.Me[k * n + l];
+  return inertia;
+}
+
 /// The body alone at rest of its modes: inertia, and the forces of its motion; fills mc, J, Cr and the modal forces.
 template <class T>
 void add_body(const Link& link, const T* y, LinkScratch<T>& s) {
@@ -63,27 +163,15 @@ void add_body(const Link& link, const T* y, LinkScratch<T>& s) {
   const auto n = static_cast<size_t>(b.n);
   const T *q = y + link.q, *q_dot = y + link.q_dot;
   const Vec3<T>& w = s.w;
-  equations::Inertia<T> inertia = equations::inertia_at(b, q, q_dot, s.modes);
-  equations::modal_forces(b, w, q, q_dot, s.modes);
-  Vec3<T> Ct_rate{}, Cr_rate{}, t2{}, w2{};
+  equations::Inertia<T> inertia;
+  BiasForce<T> bias;
+  Vec3<T> Ct_rate{}, Cr_rate{};
   if (link.second_order) {
-    for (size_t k = 0; k < n; ++k) s.Ct[k] = equations::lift<T>(b.Ct[k]);
-    for (const Term& t : link.Ct_slope) {
-      const T v = t.value * q[t.l];
-      component(s.Ct[static_cast<size_t>(t.k)], t.component) += v;
-      component(inertia.mc, t.component) += 0.5 * (v * q[t.k]);
-      component(t2, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
-    }
-    for (const Term& t : link.Cr_slope) {
-      component(s.modes.Cr[static_cast<size_t>(t.k)], t.component) += t.value * q[t.l];
-      component(w2, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
-    }
-    for (size_t k = 0; k < n; ++k) {
-      s.Gt[k] = Vec3<T>{};
-      for (size_t l = b.row_begin(k); l < b.row_end(k); ++l) s.Gt[k] += b.Me_inverse[k * n + l] * s.Ct[l];
-      Ct_rate += q_dot[k] * s.Ct[k];
-    }
+    inertia = second_order_body(link, w, q, q_dot, s.second_order, s.modes, bias);
+    for (size_t k = 0; k < n; ++k) Ct_rate += q_dot[k] * s.second_order.Ct[k];
   } else {
+    inertia = equations::inertia_at(b, q, q_dot, s.modes);
+    equations::modal_forces(b, w, q, q_dot, s.modes);
     for (size_t k = 0; k < n; ++k) Ct_rate += q_dot[k] * b.Ct[k];
   }
   for (size_t k = 0; k < n; ++k) Cr_rate += q_dot[k] * s.modes.Cr[k];
@@ -97,24 +185,41 @@ void add_body(const Link& link, const T* y, LinkScratch<T>& s) {
   I.tw.row[0] += Vec3<T>{zero, c.z, -c.y};  // -tilde(mc)
   I.tw.row[1] += Vec3<T>{-c.z, zero, c.x};
   I.tw.row[2] += Vec3<T>{c.y, -c.x, zero};
-  I.ft -= cross(w, cross(w, c) + 2.0 * Ct_rate) + t2;
-  I.fw -= cross(w, inertia.J * w + Cr_rate) + inertia.J_dot * w + w2;
+  I.ft += bias.t - cross(w, cross(w, c) + 2.0 * Ct_rate);
+  I.fw += bias.w - (cross(w, inertia.J * w + Cr_rate) + inertia.J_dot * w);
   s.I = I;
 }
 
-/// Eliminates q_ddot by Me^-1.
-template <bool constant_Ct, class T, class C>
-void eliminate_modes(const equations::Body& b, const std::vector<Vec3<C>>& Ct, const std::vector<Vec3<C>>& Gt,
-                     LinkScratch<T>& s) {
-  const auto n = static_cast<size_t>(b.n);
+/// The inverse of a mass matrix Me, n x n: constant, or that of this moment. Row k of it is zero outside begin .. end.
+template <class C>
+struct InverseOfMe {
+  const C* values;
+  size_t n;
+  bool diagonal;
+
+  size_t begin(size_t k) const { return diagonal ? k : 0; }
+  size_t end(size_t k) const { return diagonal ? k + 1 : n; }
+  const C* row(size_t k) const { return values + k * n; }
+};
+
+inline InverseOfMe<double> inverse_of_Me(const equations::Body& b) {
+  return {b.Me_inverse.data(), static_cast<size_t>(b.n), b.diagonal};
+}
+
+/// Eliminates q_ddot by Me^-1. `Ctt`: Ct Me^-1 Ct^T where it is constant, else null.
+template <class T, class C>
+void eliminate_modes(const InverseOfMe<C>& inverse, const std::vector<Vec3<C>>& Ct, const std::vector<Vec3<C>>& Gt,
+                     const Sym3<double>* Ctt, LinkScratch<T>& s) {
+  const size_t n = inverse.n;
   equations::BodyScratch<T>& modes = s.modes;
   HubSystem<T> I = s.I;
   for (size_t k = 0; k < n; ++k) {
     Vec3<T> G{};
     T g = T(0.0);
-    for (size_t l = b.row_begin(k); l < b.row_end(k); ++l) {
-      G += b.Me_inverse[k * n + l] * modes.Cr[l];
-      g += b.Me_inverse[k * n + l] * modes.b[l];
+    const C* row = inverse.row(k);
+    for (size_t l = inverse.begin(k); l < inverse.end(k); ++l) {
+      G += row[l] * modes.Cr[l];
+      g += row[l] * modes.b[l];
     }
     modes.Gw[k] = G;
     modes.g[k] = g;
@@ -125,14 +230,14 @@ void eliminate_modes(const equations::Body& b, const std::vector<Vec3<C>>& Ct, c
     I.ft -= g * Ct[k];
     I.fw -= g * w;
   }
-  if constexpr (constant_Ct) {
-    const Sym3<double>& c = b.Ctt;
+  if (Ctt != nullptr) {
+    const Sym3<double>& c = *Ctt;
     I.tt += Sym3<T>{T(-c.xx), T(-c.yy), T(-c.zz), T(-c.xy), T(-c.yz), T(-c.zx)};
   } else {
     for (size_t k = 0; k < n; ++k) {
-      const Vec3<T>&t = Ct[k], &g = Gt[k];
-      I.tt.xx -= t.x * g.x, I.tt.yy -= t.y * g.y, I.tt.zz -= t.z * g.z;
-      I.tt.xy -= t.x * g.y, I.tt.yz -= t.y * g.z, I.tt.zx -= t.z * g.x;
+      const Vec3<C>&t = Ct[k], &g = Gt[k];
+      I.tt +=
+          Sym3<T>{T(-(t.x * g.x)), T(-(t.y * g.y)), T(-(t.z * g.z)), T(-(t.x * g.y)), T(-(t.y * g.z)), T(-(t.z * g.x))};
     }
   }
   s.I = I;
@@ -175,17 +280,17 @@ std::array<T, 6> entries(const Twist<T>& a) {
 /// F = W' (X A + h) - f', A the acceleration of the body, X A + h that of the place without F, and W' = (1 + W G)^-1 W
 /// the child's inertia W behind the compliance G of the modes: sums of positive terms, however heavy the child.
 template <class T, class C>
-void add_hung_children(const Link& link, const std::vector<Vec3<C>>& Gt, LinkScratch<T>& s) {
-  const equations::Body& b = link.body;
-  const auto n = static_cast<size_t>(b.n), slots = static_cast<size_t>(link.slots), size = 6 * slots,
-             columns = size + 1;
+void add_hung_children(const Link& link, const InverseOfMe<C>& inverse, const std::vector<Vec3<C>>& Gt,
+                       LinkScratch<T>& s) {
+  const size_t n = inverse.n, slots = static_cast<size_t>(link.slots), size = 6 * slots, columns = size + 1;
   for (size_t i = 0; i < slots; ++i)
     for (size_t k = 0; k < n; ++k) {
       Twist<T>& P = s.P[i * n + k];
       P = {};
-      for (size_t l = b.row_begin(k); l < b.row_end(k); ++l) {
-        P.t += b.Me_inverse[k * n + l] * s.U[i * n + l].t;
-        P.w += b.Me_inverse[k * n + l] * s.U[i * n + l].w;
+      const C* row = inverse.row(k);
+      for (size_t l = inverse.begin(k); l < inverse.end(k); ++l) {
+        P.t += row[l] * s.U[i * n + l].t;
+        P.w += row[l] * s.U[i * n + l].w;
       }
     }
   for (T& w : s.W) w = T(0.0);

@@ -1,6 +1,7 @@
 #include "dynamics/tree_model.hpp"
 
 #include "dynamics/body_constants.hpp"
+#include "dynamics/second_order_shapes.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
@@ -158,6 +159,15 @@ void set_mechanism(const Joint& joint, Link& link) {
   link.prescribed = !joint.prescribed.empty();
 }
 
+void set_second_order(const SecondOrderShapes& body, const Vector3d& origin, const Matrix3d& axes, Link& link) {
+  const ReducedBody own = seen_from(body.body, origin, axes);
+  pack_integrals(own, link.shapes);
+  link.follow = packed_vector_family(body.follow);
+  const auto r = std::ssize(body.follow), n = own.n() - r;
+  for (Eigen::Index a = n; a < own.n(); ++a)
+    for (Eigen::Index k = 0; k < n; ++k) link.Me_follow.push_back(own.Me(a, k));
+}
+
 Link make_link(const Multibody& scene, int index, int joint_index, Stiffening stiffening) {
   const Joint& joint = scene.joints[static_cast<size_t>(joint_index)];
   const ReducedBody& body = scene.bodies[static_cast<size_t>(index)];
@@ -170,15 +180,9 @@ Link make_link(const Multibody& scene, int index, int joint_index, Stiffening st
   const Matrix3d to_link = joint.b.axes.transpose();
   link.brf_axes = mat3(to_link);
   link.brf_origin = vec3(-to_link * origin);
-  ReducedBody own = seen_from(body, origin, joint.b.axes);
+  const ReducedBody own = seen_from(body, origin, joint.b.axes);
   link.second_order = stiffening == Stiffening::on && body.n() > 0;
-  require(!link.second_order || !body.Kg.spin.empty(),
-          fmt::format("body {}: its geometric stiffness is asked for but the reduced body has none", body.name));
-  if (link.second_order) {
-    add_second_order_inertia(own);
-    link.Ct_slope = packed_vector_family(own.Kg.acceleration);
-    link.Cr_slope = packed_vector_family(own.Kg.angular_acceleration);
-  }
+  if (link.second_order) set_second_order(with_second_order_shapes(body), origin, joint.b.axes, link);
   set_shapes(body, joint.b.marker, to_link, link.second_order, link.b);
   link.b.axes = mat3(Matrix3d::Identity());
   pack_invariants(own, link.body);

@@ -28,8 +28,14 @@ struct PlaceModel {
 /// A body with the joint that carries it. Its frame is place b, undeformed.
 struct Link {
   equations::Body body;
-  std::vector<Term> Ct_slope, Cr_slope;  // with geometric stiffness: Ct_k gains this q_l, Cr_k too
+  /// With geometric stiffness: integrals of n + r shapes, the last r of which follow the coordinates: they move by
+  /// Q_a = 1/2 q^T H_a q, H_a the terms of component a. Together they move the points by S q + u2(q).
+  equations::Body shapes;
+  std::vector<Term> follow;
+  std::vector<double> Me_follow;  // r x n, integral of rho S_a . S_k
   bool second_order = false;
+
+  size_t followers() const { return second_order ? static_cast<size_t>(shapes.n - body.n) : 0; }
 
   int index = 0, joint = 0;  // in the scene
   int parent = -1;           // link; -1: the inertial frame

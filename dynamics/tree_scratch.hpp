@@ -19,6 +19,17 @@ struct Eliminated {
   T u, inverse_D;
 };
 
+/// Of a body with second-order displacements: n coordinates, r shapes that follow them.
+template <class T>
+struct SecondOrderScratch {
+  std::vector<T> Q, Q_dot, Q_ddot;        // of all shapes, n + r; of the r alone, what q_ddot does not give
+  std::vector<T> slope;                   // dQ_a/dq_k, r x n
+  equations::BodyScratch<T> shapes;       // of all shapes
+  std::vector<Vec3<T>> Ct, Gt;            // Ct(q), Me(q)^-1 Ct(q)^T, n
+  std::vector<T> Me, factor, Me_inverse;  // Me(q), L D L^T of it, its inverse, n x n
+  double least_pivot = 1;                 // of Me(q), over the element of its diagonal
+};
+
 template <class T>
 struct LinkScratch {
   PlaceMotion<T> a, b;  // relative to the frames of parent and body
@@ -36,8 +47,8 @@ struct LinkScratch {
   equations::BodyScratch<T> modes;
   Vec3<T> mc;
   Sym3<T> J;
-  std::vector<Vec3<T>> Ct, Gt;  // of a body with second-order displacements
-  Twist<T> external;            // forces on the body about its origin
+  SecondOrderScratch<T> second_order;
+  Twist<T> external;  // forces on the body about its origin
   std::vector<T> external_modal;
 
   HubSystem<T> I;  // of the body and all that hangs on it; in the end at place b, freedoms eliminated
@@ -83,7 +94,13 @@ struct Scratch {
       s.modes.Cr.resize(n), s.modes.Gw.resize(n), s.modes.b.resize(n), s.modes.g.resize(n);
       s.external_modal.resize(n), s.q_ddot.resize(n);
       if (!link.hung_on_moving_place) fix_place(link.a, s.a);
-      if (link.second_order) s.Ct.resize(n), s.Gt.resize(n);
+      if (link.second_order) {
+        SecondOrderScratch<T>& o = s.second_order;
+        const size_t r = link.followers();
+        o.Q.resize(n + r), o.Q_dot.resize(n + r), o.Q_ddot.resize(r), o.slope.resize(r * n);
+        o.shapes = equations::BodyScratch<T>(n + r);
+        o.Ct.resize(n), o.Gt.resize(n), o.Me.resize(n * n), o.factor.resize(n * n), o.Me_inverse.resize(n * n);
+      }
       s.hung.resize(k), s.place.resize(k);
       s.U.resize(k * n), s.P.resize(k * n);
       s.K.resize(36 * k * k), s.W.resize(6 * k * (6 * k + 1)), s.Z.resize(42 * k), s.F.resize(42 * k);

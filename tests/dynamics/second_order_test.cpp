@@ -1,0 +1,115 @@
+// The second-order displacements of geometric stiffness: a kinetic energy that is a square, whatever the deflection.
+
+#include "dynamics/second_order_shapes.hpp"
+
+#include "dynamics/tree.hpp"
+#include "fem/boom.hpp"
+#include "fem/check.hpp"
+#include "reduction/geometric_stiffness.hpp"
+#include "reduction/inertia_invariants.hpp"
+#include "tree_testing.hpp"
+
+#include <gtest/gtest.h>
+#include <Eigen/Eigenvalues>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using testing::at_marker;
+using testing::place;
+
+/// A clamped beam with a mass beside its tip, all its lowest modes, with the geometric stiffness of its motion and of
+/// loads at its tip.
+ReducedBody stiffened_beam(const SectionShape& section, double length, double tip_mass, int modes) {
+  BeamGeometry g;
+  g.segments.push_back({section, section, length, Material{70e9, 0.33, 2700}, 12});
+  if (tip_mass > 0)
+    g.attachments.push_back({"load", length, tip_mass, 1e-4 * tip_mass * Matrix3d::Identity(), {0.01, 0.02, -0.01}});
+  const Mesh mesh = make_mesh(g);
+  const Assembly assembly = assemble(mesh);
+  const Clamp clamp = node_set(mesh, "root");
+  const ModalBasis basis = clamped_modes(mesh, assembly, clamp, {.num_modes = modes, .sigma = {}, .backend = "dense"});
+  ReducedBody body = reduce(mesh, assembly, basis, "beam");
+  body.Kg = geometric_stiffness(mesh, assembly, clamp, basis.Phi, {.markers = {"tip"}});
+  return body;
+}
+
+/// Mass matrix over u: twice the kinetic energy is u^T M u.
+MatrixXd mass_matrix(const Tree& tree, const VectorXd& y0) {
+  const TreeLayout& l = tree.layout();
+  VectorXd y = y0;
+  y.segment(l.u_begin(), l.u).setZero();
+  const auto energy = [&](Index i, Index j) {
+    VectorXd moving = y;
+    moving[l.u_begin() + i] += 1;
+    if (j >= 0) moving[l.u_begin() + j] += 1;
+    return tree.balance(0, moving).kinetic;
+  };
+  MatrixXd M(l.u, l.u);
+  for (Index i = 0; i < l.u; ++i) M(i, i) = 2 * energy(i, -1);
+  for (Index i = 0; i < l.u; ++i)
+    for (Index j = 0; j < i; ++j) M(i, j) = M(j, i) = energy(i, j) - 0.5 * (M(i, i) + M(j, j));
+  return M;
+}
+
+/// Least eigenvalue of a symmetric matrix scaled to a diagonal of 1.
+double least_eigenvalue(const MatrixXd& M) {
+  const VectorXd scale = M.diagonal().cwiseSqrt().cwiseInverse();
+  return Eigen::SelfAdjointEigenSolver<MatrixXd>(scale.asDiagonal() * M * scale.asDiagonal(), Eigen::EigenvaluesOnly)
+      .eigenvalues()[0];
+}
+
+TEST(SecondOrder, MassMatrixIsPositiveDefiniteHoweverTheBodyBends) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (const SectionShape& section : {SectionShape{RoundBar{0.01}}, SectionShape{Rectangle{0.005, 0.05}}})
+    for (const double tip_mass : {0.0, 0.5})
+      for (const int modes : {1, 2, 3, 5, 8, 13, 20, 40}) {
+        Multibody scene;
+        scene.bodies.push_back(stiffened_beam(section, 1.0, tip_mass, modes));
+        scene.joints.push_back(testing::joint("shaft", JointKind::hinge, place(-1), place(0)));
+        const Tree tree(scene, {Stiffening::on});
+        const ReducedBody& body = scene.bodies[0];
+        for (int trial = 0; trial < 8; ++trial) {
+          TreeState s = tree.at_rest();
+          const VectorXd noise = VectorXd::NullaryExpr(modes, [&] { return uniform(random); });
+          // Deflections from 1e-3 to the length of the beam and beyond.
+          s.q[0] = noise * std::pow(10, -3 + 0.5 * trial) / (marker(body, "tip").S * noise).cwiseAbs().maxCoeff();
+          const double least = least_eigenvalue(mass_matrix(tree, tree.pack(s)));
+          EXPECT_GT(least, 0) << modes << " modes, tip mass " << tip_mass << ", trial " << trial;
+        }
+      }
+}
+
+// A thin rod on a universal joint: at a right angle the first axis of the joint is the rod itself.
+TEST(SecondOrder, SingularMassMatrixIsAnErrorThatNamesTheBody) {
+  Multibody scene;
+  scene.bodies.push_back(rigid_body("rod", 2.0, Vector3d(0.5, 0, 0), Vector3d(0, 1, 1).asDiagonal()));
+  scene.joints.push_back(testing::joint("gimbal", JointKind::universal, place(-1), place(0)));
+  const Tree tree(scene);
+  TreeState s = tree.at_rest();
+  s.joints[0].coordinate = {0.3, 1.2};
+  VectorXd y = tree.pack(s), y_dot(y.size());
+  const std::vector<char> open(1, 0);
+  tree.derivative(0, y.data(), open, *tree.workspace(), y_dot.data());
+  s.joints[0].coordinate = {0.3, std::numbers::pi / 2};
+  y = tree.pack(s);
+  try {
+    tree.derivative(0, y.data(), open, *tree.workspace(), y_dot.data());
+    ADD_FAILURE() << "no error";
+  } catch (const NumericalError& error) {
+    EXPECT_NE(std::string(error.what()).find("rod"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace flexboom
