@@ -85,8 +85,9 @@ TEST(StiffenedTrees, FlyAndKeepTheirEnergy) {
 
 TEST(SlowStiffenedTrees, TwentyFlyAndKeepTheirEnergyWithUpToFortyModes) {
   for (unsigned seed = 1; seed <= 20; ++seed)
-    for (const int modes : {1, 2, 5, 12, 40})
-      for (const char* stiffening : {"on", "auto"}) fly_random_tree(seed, modes, stiffening, modes > 12 ? 2e-3 : 0.02);
+    for (const int modes : {1, 2, 5, 12}) fly_random_tree(seed, modes, seed % 2 ? "on" : "auto", 0.01);
+  // The fastest of 40 clamped modes on a hinge set steps near 1e-8 s.
+  for (unsigned seed = 1; seed <= 5; ++seed) fly_random_tree(seed, 40, "on", 1e-4);
 }
 
 // The scenes of the program with eight modes per body: with terms of the first order in the second-order displacements
