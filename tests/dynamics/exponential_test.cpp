@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Complex = std::complex<double>;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 /// (k - 1)! phi_k(w): the integral of its definition by the 5-point Lobatto rule on many pieces.
 Complex phi_by_quadrature(int k, Complex w) {

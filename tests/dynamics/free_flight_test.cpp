@@ -24,7 +24,7 @@ using Eigen::VectorXd;
 using test::boom4;
 using test::make_boom;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 /// A push on the tip along a fixed direction in space, so small that squares of the deflection (1e-4 of the length)
 /// do not count: with them the two descriptions are two models.

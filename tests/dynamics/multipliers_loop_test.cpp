@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 using testing::at;
 using testing::joint;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 void expect_no_drift(const MultipliersSummary& s) {
   // What the method promises at tolerances of 1e-8 and below.

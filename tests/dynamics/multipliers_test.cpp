@@ -23,7 +23,7 @@ using testing::at;
 using testing::at_marker;
 using testing::joint;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 Multipliers torque_free() {
   Multibody scene;

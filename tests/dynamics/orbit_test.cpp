@@ -17,7 +17,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Long3 = Eigen::Matrix<long double, 3, 1>;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 const Planet earth;
 const Planet oblate{.J2 = earth_J2};
 const OrbitalElements iss = circular_orbit(405e3, 0.9076);

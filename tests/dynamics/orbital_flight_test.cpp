@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double four_hours = 14400;
 
 Vector4d quaternion(const Matrix3d& A) {

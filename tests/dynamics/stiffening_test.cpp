@@ -24,7 +24,7 @@ using Eigen::VectorXd;
 using testing::at_marker;
 using testing::place;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 /// int_0^1 f over x by Gauss' rule with 5 points in each of many cells: round-off for shapes of order 40.
 template <class F>

@@ -13,12 +13,12 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 VectorXd values(std::initializer_list<double> v) { return Eigen::Map<const VectorXd>(v.begin(), std::ssize(v)); }
 
 /// Oscillators whose sum is the gap: a step that is short for the first and long for the others.
-struct Case {
+struct SearchCase {
   VectorXd frequency, damping, amplitude, phase;
   Eigen::Index n;
   LinearPart linear;
@@ -26,7 +26,7 @@ struct Case {
   CollocatedStep step;
   Layout layout;
 
-  Case(const VectorXd& w, const VectorXd& d, const VectorXd& a, const VectorXd& at)
+  SearchCase(const VectorXd& w, const VectorXd& d, const VectorXd& a, const VectorXd& at)
       : frequency(w), damping(d), amplitude(a), phase(at), n(w.size()), linear(matrix(w, d), -1, VectorXd::Zero(n)) {
     layout.body = {0};
     layout.p = layout.u = static_cast<int>(n);
@@ -97,7 +97,7 @@ struct Case {
 TEST(StopSearch, FindsTheFirstContactOfAFastVibration) {
   for (const double fast : {5.0, 70.0, 900.0, 7000.0})
     for (const double phase : {0.1, 1.7, 3.0}) {
-      Case c(values({1.3, fast}), values({0.1, 0.2}), values({1, 0.02}), values({0.7 + pi, phase}));
+      SearchCase c(values({1.3, fast}), values({0.1, 0.2}), values({1, 0.02}), values({0.7 + pi, phase}));
       const double expected = c.expected();
       ASSERT_LT(expected, 1);
       EXPECT_NEAR(c.found(), expected, 1e-11) << fast << " " << phase;
@@ -107,8 +107,8 @@ TEST(StopSearch, FindsTheFirstContactOfAFastVibration) {
 // A vibration that is wide and not so fast counts beside one whose rate is a hundred times larger.
 TEST(StopSearch, FindsAWideVibrationBesideAFastOne) {
   for (const double phase : {0.1, 1.3, 2.5, 3.7, 4.9}) {
-    Case c(values({1.0, 73.66, 17795}), values({0, 0.2, 0.2}), values({0.03, 0.02, 0.00497}),
-           values({pi, phase, 2 * phase}));
+    SearchCase c(values({1.0, 73.66, 17795}), values({0, 0.2, 0.2}), values({0.03, 0.02, 0.00497}),
+                 values({pi, phase, 2 * phase}));
     ASSERT_LT(c.gap(0), 0);
     const double expected = c.expected();
     ASSERT_LT(expected, 1);
@@ -119,7 +119,7 @@ TEST(StopSearch, FindsAWideVibrationBesideAFastOne) {
 // It stays clear by less than the amplitude of the vibration.
 TEST(StopSearch, FindsNoContactWhereThereIsNone) {
   for (const double fast : {70.0, 900.0}) {
-    Case near(values({0.2, fast}), values({0, 0.2}), values({0.1, 0.0975}), values({pi, 0}));
+    SearchCase near(values({0.2, fast}), values({0, 0.2}), values({0.1, 0.0975}), values({pi, 0}));
     EXPECT_EQ(near.expected(), 2);
     EXPECT_EQ(near.found(), 2);
   }

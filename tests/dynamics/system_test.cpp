@@ -20,7 +20,7 @@ using testing::PointBody;
 
 /// Appendages with every invariant non-zero on a hub, a random state, and the point masses as the oracle. By the
 /// numbers of their modes four are computed side by side, two, and two alone.
-struct Case {
+struct HubCase {
   static constexpr std::array modes = {3, 2, 2, 4, 2, 3, 2, 2};
 
   std::mt19937 random{42};
@@ -30,7 +30,7 @@ struct Case {
   VectorXd y;
   std::vector<char> contact = {1, 0, 1, 1, 0, 0, 0, 1};
 
-  explicit Case(bool fixed_hub = false, const std::optional<OrbitalField>& field = {}) {
+  explicit HubCase(bool fixed_hub = false, const std::optional<OrbitalField>& field = {}) {
     J_hub(0, 1) = J_hub(1, 0) = 0.05;
     std::vector<Appendage> appendages;
     for (size_t i = 0; i < modes.size(); ++i) {
@@ -71,7 +71,7 @@ struct Case {
 };
 
 /// u_dot, hub acceleration and power of gravity by virtual power over the point masses: no invariant is formed.
-VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub, double& power) {
+VectorXd oracle_accelerations(const HubCase& c, Vector3d& a_hub, double& power) {
   const State s = c.system->unpack(c.y);
   const Layout& l = c.system->layout();
   const int n = 3 + l.u;  // hub translation (hub axes), then u
@@ -119,7 +119,7 @@ VectorXd oracle_accelerations(const Case& c, Vector3d& a_hub, double& power) {
 }
 
 TEST(System, AccelerationsAgreeWithVirtualPowerOverPointMasses) {
-  const Case c;
+  const HubCase c;
   Vector3d a_hub;
   double power = 0;
   const VectorXd expected = oracle_accelerations(c, a_hub, power);
@@ -134,7 +134,7 @@ TEST(System, AccelerationsAgreeWithVirtualPowerOverPointMasses) {
 /// A gradient of 0.7 1/s^2, as strong as the motion; linear, as it is within a body.
 TEST(System, AccelerationsInAFieldOfGravityAgreeWithVirtualPower) {
   const Orbit orbit({.semi_major_axis = 1e3, .inclination = 0.9, .mean_anomaly = 0.4}, {.mu = 0.7e9});
-  const Case c(false, OrbitalField{orbit, false}), free;
+  const HubCase c(false, OrbitalField{orbit, false}), free;
   Vector3d a_hub;
   double power = 0;
   const VectorXd expected = oracle_accelerations(c, a_hub, power);
@@ -145,14 +145,14 @@ TEST(System, AccelerationsInAFieldOfGravityAgreeWithVirtualPower) {
   const Vector3d inertial = rotation_matrix(c.system->unpack(c.y).attitude) * a_hub;
   EXPECT_LT((y_dot.segment<3>(l.velocity()) - inertial).norm(), 1e-12 * inertial.norm());
   EXPECT_NEAR(free.derivative(c.y)[l.dissipated()] - y_dot[l.dissipated()], power, 1e-12 * std::abs(power));
-  EXPECT_THROW(Case(true, OrbitalField{orbit}), InputError);
+  EXPECT_THROW(HubCase(true, OrbitalField{orbit}), InputError);
 }
 
-TEST(System, BodyMadeOfPointsHasConsistentInvariants) { EXPECT_NO_THROW(Case().points[0].body.validate()); }
+TEST(System, BodyMadeOfPointsHasConsistentInvariants) { EXPECT_NO_THROW(HubCase().points[0].body.validate()); }
 
 TEST(System, JacobianAgreesWithCentralDifferences) {
   for (const bool fixed : {false, true}) {
-    const Case c(fixed);
+    const HubCase c(fixed);
     const auto work = c.system->workspace();
     c.system->jacobian(c.y.data(), c.contact, *work);
     const MatrixXd J = c.system->dense_jacobian(*work);
@@ -170,7 +170,7 @@ TEST(System, JacobianAgreesWithCentralDifferences) {
 
 TEST(System, NewtonSolveInvertsIMinusGammaJ) {
   for (const bool fixed : {false, true}) {
-    const Case c(fixed);
+    const HubCase c(fixed);
     const auto work = c.system->workspace();
     c.system->jacobian(c.y.data(), c.contact, *work);
     const double gamma = 0.37;
@@ -185,14 +185,14 @@ TEST(System, NewtonSolveInvertsIMinusGammaJ) {
 
 /// d/dt of a function of the state along the motion, by a central difference.
 template <class F>
-auto rate_of(const Case& c, F f) {
+auto rate_of(const HubCase& c, F f) {
   const double h = 1e-6;
   const VectorXd y_dot = c.derivative(c.y);
   return ((f(c.y + h * y_dot) - f(c.y - h * y_dot)) / (2 * h)).eval();
 }
 
 TEST(System, PowerBalances) {
-  const Case c;
+  const HubCase c;
   const auto energy = [&](const VectorXd& y) {
     const Balance b = c.system->balance(y, *c.system->workspace());
     return Eigen::Matrix<double, 1, 1>(b.kinetic + b.elastic + y[c.system->layout().dissipated()]);
@@ -202,7 +202,7 @@ TEST(System, PowerBalances) {
 }
 
 TEST(System, MomentaAreConserved) {
-  const Case c;
+  const HubCase c;
   EXPECT_LT(rate_of(c, [&](const VectorXd& y) { return c.system->balance(y, *c.system->workspace()).momentum; }).norm(),
             1e-8);
   EXPECT_LT(rate_of(c, [&](const VectorXd& y) { return c.system->balance(y, *c.system->workspace()).angular_momentum; })
@@ -212,7 +212,7 @@ TEST(System, MomentaAreConserved) {
 
 // By the point masses: first and second moments, and the velocity of the first.
 TEST(System, IsOneBodyAboutItsMassCentre) {
-  const Case c;
+  const HubCase c;
   const Whole whole = c.system->whole(c.y, *c.system->workspace());
   const State s = c.system->unpack(c.y);
   double m = c.system->hub().m;
@@ -241,7 +241,7 @@ TEST(System, IsOneBodyAboutItsMassCentre) {
 }
 
 TEST(System, MotionIsTheSameSeenFromAnotherInertialFrame) {
-  const Case c;
+  const HubCase c;
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.8, Vector3d(1, 2, -1).normalized()));
   State s = c.system->unpack(c.y);
   s.attitude = quaternion_product({turn.w(), turn.x(), turn.y(), turn.z()}, s.attitude);

@@ -11,7 +11,7 @@
 namespace flexboom {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double eps = 2.3e-16;
 
 std::array<double, 3> at(const TimeFunction& f, double t) { return {f.value(t), f.rate(t), f.acceleration(t)}; }

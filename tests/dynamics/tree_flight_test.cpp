@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 using testing::at_marker;
 using testing::place;
 
-IntegratorOptions options(const std::string& method, double tolerance, double duration, double output_step) {
+IntegratorOptions tree_options(const std::string& method, double tolerance, double duration, double output_step) {
   IntegratorOptions o;
   o.method = method, o.tolerance = tolerance, o.duration = duration, o.output_step = output_step;
   return o;
@@ -39,7 +39,7 @@ TEST(TreeFlight, TorqueFreeTumblingIsJacobis) {
   const Tree tree(free_bodies({{0.134942, 0.10477, 0.05858}}));
   TreeState s = tree.at_rest();
   s.joints[0].omega = Vector3d(0.1, 1, 0.05);
-  const TreeTrajectory flight = integrate(tree, tree.pack(s), options("adams", 1e-12, 200, 1.0));
+  const TreeTrajectory flight = integrate(tree, tree.pack(s), tree_options("adams", 1e-12, 200, 1.0));
   double omega = 0, attitude = 0;
   const auto table = testing::read_csv("torque_free_case_b.csv");
   for (size_t i = 0; i < table.size(); ++i) {
@@ -74,7 +74,7 @@ TEST(TreeFlight, FlexibleArmKeepsItsEnergy) {
     TreeState s = tree.at_rest();
     s.joints[0].coordinate = {0.3};
     s.joints[1].coordinate = {0.5};
-    const TreeTrajectory flight = integrate(tree, tree.pack(s), options(method, 1e-8, 2, 0.02));
+    const TreeTrajectory flight = integrate(tree, tree.pack(s), tree_options(method, 1e-8, 2, 0.02));
     EXPECT_LT(flight.summary.energy_balance, 1e-8);
   }
 }
@@ -98,7 +98,7 @@ TEST(TreeFlight, ChainOfStiffLinksIsTheChainOfRigidOnes) {
   s.joints[0].coordinate = {0.3}, s.joints[1].coordinate = {0.5};
   TreeState r = b.at_rest();
   r.joints = s.joints;
-  const auto o = options("bdf", 1e-7, 2, 0.02);
+  const auto o = tree_options("bdf", 1e-7, 2, 0.02);
   const TreeTrajectory soft = integrate(a, a.pack(s), o), hard = integrate(b, b.pack(r), o);
   double difference = 0;
   for (size_t i = 0; i < soft.y.size(); ++i)
@@ -122,7 +122,7 @@ TEST(TreeFlight, FreeChainKeepsItsMomenta) {
   TreeState s = testing::random_state(tree, random);
   for (auto& q : s.q) q *= 0.01;
   for (auto& q : s.q_dot) q *= 0.1;
-  const TreeTrajectory flight = integrate(tree, tree.pack(s), options("bdf", 1e-9, 2, 0.05));
+  const TreeTrajectory flight = integrate(tree, tree.pack(s), tree_options("bdf", 1e-9, 2, 0.05));
   EXPECT_LT(flight.summary.energy_balance, 1e-8);
   EXPECT_LT(flight.summary.momentum_drift, 1e-9);
   EXPECT_GT(flight.balance.back().dissipated_by_joint[0], 1e-3);
@@ -138,7 +138,7 @@ TEST(TreeFlight, FlexibleBoomOnItsStopFollowsTheReference) {
   const Tree tree(scene);
   TreeState s = tree.at_rest();
   s.joints[0].coordinate = {std::numbers::pi / 2 + 3 * std::numbers::pi / 180};
-  const auto o = options("bdf", 1e-11, 1, 0.005);
+  const auto o = tree_options("bdf", 1e-11, 1, 0.005);
   const TreeTrajectory flight = integrate(tree, tree.pack(s), o);
   size_t k = 0;
   for (const auto& row : events) {
@@ -168,7 +168,7 @@ TEST(TreeFlight, WheelTurnsItsBody) {
   w.torque = [](double t) { return std::sin(t); };
   scene.wheels.push_back(w);
   const Tree tree(scene);
-  const TreeTrajectory flight = integrate(tree, tree.pack(tree.at_rest()), options("adams", 1e-10, 3, 0.5));
+  const TreeTrajectory flight = integrate(tree, tree.pack(tree.at_rest()), tree_options("adams", 1e-10, 3, 0.5));
   const TreeState end = tree.unpack(flight.y.back());
   const double impulse = 1 - std::cos(3.0);
   EXPECT_NEAR(end.joints[0].omega.z(), -impulse / 4, 1e-10);  // J omega_dot = -torque
@@ -187,7 +187,7 @@ TEST(TreeFlight, WheelStiffensASpinningBody) {
   const Tree tree(scene);
   TreeState s = tree.at_rest();
   s.joints[0].omega = Vector3d(0.1, 0, wz);
-  const TreeTrajectory flight = integrate(tree, tree.pack(s), options("adams", 1e-10, 3, 0.5));
+  const TreeTrajectory flight = integrate(tree, tree.pack(s), tree_options("adams", 1e-10, 3, 0.5));
   const double rate = (h + (Jz - J) * wz) / J;
   const Vector3d omega = tree.unpack(flight.y.back()).joints[0].omega;
   EXPECT_NEAR(omega.x(), 0.1 * std::cos(rate * 3), 1e-9);
@@ -200,7 +200,7 @@ TEST(TreeFlight, BodiesThatFlyApartDoNotFeelEachOther) {
   const Tree tree(scene);
   TreeState s = tree.at_rest();
   s.joints[0].velocity = Vector3d(1, 0, 0), s.joints[1].velocity = Vector3d(0, -2, 0);
-  const TreeTrajectory flight = integrate(tree, tree.pack(s), options("adams", 1e-9, 2, 1));
+  const TreeTrajectory flight = integrate(tree, tree.pack(s), tree_options("adams", 1e-9, 2, 1));
   EXPECT_LT((tree.unpack(flight.y.back()).joints[0].position - Vector3d(2, 0, 0)).norm(), 1e-12);
   EXPECT_LT((tree.unpack(flight.y.back()).joints[1].position - Vector3d(0, -4, 0)).norm(), 1e-12);
 }

@@ -94,7 +94,7 @@ TEST(Tree, OfAHubWithHingedBoomsIsTheSystem) {
 enum class Where { fixed, marker };
 
 /// Body 0 on the inertial frame, 1 on 0, 2 and 3 on 1, all by one kind of joint, gravity, one place of every kind.
-struct Case {
+struct TreeCase {
   std::mt19937 random{7};
   std::vector<PointBody> points;
   std::unique_ptr<Tree> tree;
@@ -102,7 +102,7 @@ struct Case {
   double t = 0.7;
   std::vector<char> contact;
 
-  Case(JointKind root, JointKind kind, Where a, Where b, bool prescribed = false) {
+  TreeCase(JointKind root, JointKind kind, Where a, Where b, bool prescribed = false) {
     Multibody scene;
     scene.gravity = Vector3d(0.3, -9.81, 1.7);
     std::uniform_real_distribution<double> uniform(-1, 1);
@@ -165,7 +165,7 @@ VectorXd accelerations(const Tree& tree, const VectorXd& y_dot, int size) {
   return r;
 }
 
-void expect_virtual_power(const Case& c, const std::string& what) {
+void expect_virtual_power(const TreeCase& c, const std::string& what) {
   const Oracle oracle(*c.tree, c.points);
   std::vector<char> given;
   const VectorXd forces = c.internal_forces(oracle, given);
@@ -185,7 +185,7 @@ TEST(Tree, AccelerationsAgreeWithVirtualPowerOverPointMasses) {
       for (const Where a : {Where::fixed, Where::marker})
         for (const Where b : {Where::fixed, Where::marker})
           expect_virtual_power(
-              Case(root, type.kind, a, b),
+              TreeCase(root, type.kind, a, b),
               fmt::format("root {}, {}, a {}, b {}", joint_type(root).name, type.name,
                           a == Where::marker ? "marker" : "fixed", b == Where::marker ? "marker" : "fixed"));
 }
@@ -193,7 +193,7 @@ TEST(Tree, AccelerationsAgreeWithVirtualPowerOverPointMasses) {
 TEST(Tree, PrescribedJointsMoveAsTheyAreTold) {
   for (const JointKind kind : {JointKind::hinge, JointKind::slider, JointKind::universal})
     for (const Where where : {Where::fixed, Where::marker}) {
-      const Case c(JointKind::free, kind, where, where, true);
+      const TreeCase c(JointKind::free, kind, where, where, true);
       expect_virtual_power(c, std::string(joint_type(kind).name));
       const VectorXd y_dot = derivative(*c.tree, c.t, c.y, c.contact);
       const TreeLayout& l = c.tree->layout();
@@ -205,7 +205,7 @@ TEST(Tree, PrescribedJointsMoveAsTheyAreTold) {
 
 TEST(Tree, PlacesAreWhereTheOracleSeesThem) {
   for (const JointType& type : joint_types) {
-    Case c(JointKind::free, type.kind, Where::marker, Where::marker);
+    TreeCase c(JointKind::free, type.kind, Where::marker, Where::marker);
     const Oracle oracle(*c.tree, c.points);
     const auto frames = oracle.frames(c.y, oracle.rates(c.y), c.t);
     for (const Place& p :
@@ -223,7 +223,7 @@ TEST(Tree, PlacesAreWhereTheOracleSeesThem) {
 TEST(Tree, JacobianAgreesWithCentralDifferences) {
   for (const JointType& type : joint_types)
     for (const Where b : {Where::fixed, Where::marker}) {
-      const Case c(JointKind::free, type.kind, Where::marker, b);
+      const TreeCase c(JointKind::free, type.kind, Where::marker, b);
       const auto work = c.tree->workspace();
       MatrixXd J;
       c.tree->jacobian(c.t, c.y.data(), c.contact, *work, J);
@@ -244,7 +244,7 @@ TEST(Tree, JacobianAgreesWithCentralDifferences) {
 
 /// d/dt of a function of t and the state along the motion, by a central difference.
 template <class F>
-auto rate_of(const Case& c, F f) {
+auto rate_of(const TreeCase& c, F f) {
   const double h = 1e-6;
   const VectorXd y_dot = derivative(*c.tree, c.t, c.y, std::vector<char>(c.contact.size(), 0));
   return ((f(c.t + h, c.y + h * y_dot) - f(c.t - h, c.y - h * y_dot)) / (2 * h)).eval();
@@ -254,7 +254,7 @@ TEST(Tree, PowerBalances) {
   for (const JointType& type : joint_types)
     for (const bool prescribed : {false, true}) {
       if (prescribed && type.scalars == 0) continue;
-      Case c(JointKind::free, type.kind, Where::marker, Where::marker, prescribed);
+      TreeCase c(JointKind::free, type.kind, Where::marker, Where::marker, prescribed);
       for (const TreeLayout::Joint& j : c.tree->layout().joints)  // within the stops
         if (j.scalar >= 0 && !prescribed) c.y[j.scalar] = -std::abs(c.y[j.scalar]);
       if (prescribed) c.t = 3.0;  // the swing is on the free side
@@ -268,7 +268,7 @@ TEST(Tree, PowerBalances) {
 
 TEST(Tree, MomentaOfFreeFlightAreConserved) {
   for (const JointType& type : joint_types) {
-    Case c(JointKind::free, type.kind, Where::marker, Where::marker);
+    TreeCase c(JointKind::free, type.kind, Where::marker, Where::marker);
     Multibody scene = c.tree->scene();
     scene.gravity.setZero();
     c.tree = std::make_unique<Tree>(scene);
@@ -283,7 +283,7 @@ TEST(Tree, MomentaOfFreeFlightAreConserved) {
 // ---- loads, springs, wheels ----
 
 TEST(Tree, LoadsAndSpringsDoTheirVirtualWork) {
-  const Case bare(JointKind::free, JointKind::universal, Where::marker, Where::marker);
+  const TreeCase bare(JointKind::free, JointKind::universal, Where::marker, Where::marker);
   Multibody scene = bare.tree->scene();
   const Matrix3d axes = Eigen::Quaterniond(0.5, 0.1, -0.7, 0.2).normalized().toRotationMatrix();
   const auto constant = [](double x) { return [x](double) { return x; }; };

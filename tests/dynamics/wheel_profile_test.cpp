@@ -15,7 +15,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 const Matrix3d J = (Matrix3d() << 0.135, 0.001, 0.002, 0.001, 0.105, -0.003, 0.002, -0.003, 0.0586).finished();
 
 Vector4d inverse(const Vector4d& q) { return {q[0], -q[1], -q[2], -q[3]}; }

@@ -2,11 +2,11 @@
 
 #include "fem/check.hpp"
 #include "reduction/eigen_backends.hpp"
+#include "tests/reduction/messages.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -77,15 +77,6 @@ inline std::vector<double> membrane_frequencies(int n) {
 
 inline EigenOptions options(int modes, const std::string& backend) {
   return {.num_modes = modes, .sigma = {}, .backend = backend};
-}
-
-inline std::string message(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
 }
 
 inline std::vector<std::string> backend_names() {

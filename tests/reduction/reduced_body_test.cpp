@@ -2,6 +2,7 @@
 
 #include "fem/check.hpp"
 #include "reduction/eq14.hpp"
+#include "tests/reduction/messages.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,17 +11,9 @@
 namespace flexboom {
 namespace {
 
-ReducedBody sample() { return eq14::reduced_body({1.2, 0.3, 5.0}, 2, eq14::Planes::xy_and_xz, "boom"); }
+using test::message;
 
-/// The message of the InputError that `f` throws, empty if it throws none.
-std::string message(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  return "";
-}
+ReducedBody sample() { return eq14::reduced_body({1.2, 0.3, 5.0}, 2, eq14::Planes::xy_and_xz, "boom"); }
 
 TEST(ReducedBody, RigidBodyIsABodyWithoutModes) {
   const Eigen::Matrix3d J = Eigen::Vector3d(2, 3, 4).asDiagonal();

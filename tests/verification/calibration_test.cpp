@@ -16,7 +16,7 @@ using Eigen::Index;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 /// Largest pointing error [rad].
 double worst_pointing(const RunResult& r) {

@@ -14,7 +14,7 @@
 namespace flexboom {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 const Material aluminium{67e9, 0.33, 2840};
 
 BeamGeometry bar(const SectionShape& section, double length, const Material& material) {

@@ -9,7 +9,7 @@
 namespace flexboom {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 Scene sport(const std::string& structure) {
   Scene scene = load_scene("sport");

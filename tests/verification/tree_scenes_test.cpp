@@ -25,7 +25,7 @@ using Eigen::Vector3d;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 std::vector<std::vector<double>> reference(const std::string& file, size_t texts) {
   std::ifstream in(std::string(FLEXBOOM_TEST_DATA) + "/reference/" + file);
