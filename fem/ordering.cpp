@@ -181,7 +181,7 @@ Ordering fill_reducing_ordering(const SparseMatrix& lower_pattern) {
   }
   const Levels levels = levels_along(graph);
   const bool slender = levels.count > 4 * slice_levels && slenderness(graph, levels) > slender_from;
-  if (!slender) choice.consider("amd", CholmodGraph(graph).amd());
+  choice.consider("amd", CholmodGraph(graph).amd());  // of slender bodies too: a thin plate is as long as one
   choice.consider("rcm", band_order(levels));
   if (choice.dissection_may_pay())
     slender ? choice.consider("slices", slices_order(graph, levels)) : choice.consider("metis", dissection(graph));

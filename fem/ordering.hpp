@@ -15,8 +15,8 @@ struct Ordering {
   double flops = 0;              // multiplications and additions of a factorisation
 };
 
-/// The cheapest of approximate minimum degree, reverse Cuthill-McKee and METIS; of slender bodies, of reverse
-/// Cuthill-McKee and slices (METIS between cuts across the body). Unknowns whose columns are alike (the freedoms of a
+/// The cheapest of approximate minimum degree, reverse Cuthill-McKee and METIS; of slender bodies with slices (METIS
+/// between cuts across the body) in its place. Unknowns whose columns are alike (the freedoms of a
 /// node) are ordered as one (Ashcraft, SIAM J. Sci. Comput. 16 (1995) 1404); fill and work of each order are counted
 /// exactly along the elimination tree (Liu, SIAM J. Matrix Anal. 11 (1990) 134), and the order returned is a postorder
 /// of it. Small matrices try minimum degree alone.

@@ -113,5 +113,8 @@ TEST(Ordering, OfALongBarTakesLessWorkThanItsBand) {
   EXPECT_LT(fill_reducing_ordering(A).flops, 1.25 * n * w * w);
 }
 
+// As long as a slender body by the walk through it. Minimum degree takes 4.22e8, slices 6.73e8.
+TEST(Ordering, OfAThinPlateIsThatOfMinimumDegree) { EXPECT_LT(fill_reducing_ordering(box(41, 41, 3, 1)).flops, 4.5e8); }
+
 }  // namespace
 }  // namespace flexboom::testing
