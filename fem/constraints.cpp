@@ -2,6 +2,7 @@
 
 #include "fem/at.hpp"
 #include "fem/check.hpp"
+#include "fem/held_fields.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
@@ -201,6 +202,9 @@ std::vector<char> held_freedoms(const Mesh& mesh, const DofMap& dofs, const Clam
   }
   if (clamp.with_supports) {
     for (const Support& support : mesh.supports) hold(support.node, support.components);
+    if (!mesh.supports.empty()) {
+      for (const int dof : internal_freedoms_of_held_fields(mesh, dofs, held)) held[at(dof)] = 1;
+    }
   }
   return held;
 }

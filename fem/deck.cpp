@@ -1,6 +1,7 @@
 #include "fem/deck.hpp"
 
 #include "fem/check.hpp"
+#include "fem/files.hpp"
 
 #include <fmt/format.h>
 

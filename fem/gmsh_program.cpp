@@ -1,7 +1,9 @@
 #include "fem/gmsh_program.hpp"
 
 #include "fem/check.hpp"
+#include "fem/files.hpp"
 #include "fem/gmsh.hpp"
+#include "fem/gmsh_script.hpp"
 #include "fem/text_reader.hpp"
 
 #include <fmt/format.h>
@@ -102,8 +104,9 @@ std::vector<std::string> command(const fs::path& path, const fs::path& mesh, boo
 
 }  // namespace
 
-MeshFile mesh_with_gmsh(const fs::path& path) {
-  file_bytes(path);  // its own message when the file is missing
+MeshFile mesh_with_gmsh(const fs::path& path, const ReadOptions& options) {
+  require_regular_file(path);  // its own message when the file is missing
+  if (!options.trust) refuse_commands(path);
   std::string extension = path.extension().string();
   std::ranges::transform(extension, extension.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

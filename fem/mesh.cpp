@@ -2,6 +2,7 @@
 
 #include "fem/check.hpp"
 #include "fem/element.hpp"
+#include "fem/mesh_sets.hpp"
 #include "fem/parallel.hpp"
 #include "fem/validation.hpp"
 
@@ -9,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <numeric>
 #include <set>
@@ -211,8 +213,21 @@ void Mesh::validate(int threads) const {
   within("mesh", [&] { validate_content(*this, threads); });
 }
 
+std::string node_set_name(const Mesh& mesh, const std::string& name) {
+  if (mesh.node_sets.contains(name)) return name;
+  const auto lower = [](unsigned char c) { return std::tolower(c); };
+  std::string found = name;
+  int count = 0;
+  for (const auto& [known, nodes] : mesh.node_sets) {
+    if (!std::ranges::equal(known, name, {}, lower, lower)) continue;
+    found = known;
+    ++count;
+  }
+  return count == 1 ? found : name;
+}
+
 const std::vector<int>& node_set(const Mesh& mesh, const std::string& name) {
-  const auto found = mesh.node_sets.find(name);
+  const auto found = mesh.node_sets.find(node_set_name(mesh, name));
   if (found != mesh.node_sets.end()) return found->second;
   std::vector<std::string> names;
   for (const auto& [known, nodes] : mesh.node_sets) names.push_back(fmt::format("\"{}\"", known));

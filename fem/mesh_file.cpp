@@ -1,6 +1,7 @@
 #include "fem/mesh_file.hpp"
 
 #include "fem/check.hpp"
+#include "fem/files.hpp"
 #include "fem/gmsh.hpp"
 #include "fem/gmsh_program.hpp"
 #include "fem/read_abaqus.hpp"
@@ -22,8 +23,12 @@ namespace fs = std::filesystem;
 
 // A format that is read from memory.
 template <MeshFile (*read)(std::string_view text, const std::string& file)>
-MeshFile from_memory(const fs::path& path) {
+MeshFile from_memory(const fs::path& path, const ReadOptions&) {
   return read(file_bytes(path), path.string());
+}
+
+MeshFile read_deck(const fs::path& path, const ReadOptions& options) {
+  return read_abaqus(file_bytes(path), path.string(), options.dialect);
 }
 
 void write_deck(const fs::path& path, const Mesh& mesh) { write_abaqus(path, mesh, std::nullopt); }
@@ -36,7 +41,7 @@ constexpr std::array<std::string_view, 4> geometry_extensions = {".step", ".stp"
 
 constexpr std::array<MeshFormat, 5> formats{{
     {"Gmsh", gmsh_extensions, from_memory<read_gmsh>, write_gmsh},
-    {"CalculiX and Abaqus", abaqus_extensions, from_memory<read_abaqus>, write_deck},
+    {"CalculiX and Abaqus", abaqus_extensions, read_deck, write_deck},
     {"Nastran", nastran_extensions, from_memory<read_nastran>, nullptr},
     {"VTK", vtk_extensions, from_memory<read_vtu>, write_vtu},
     {"geometry, meshed by gmsh", geometry_extensions, mesh_with_gmsh, nullptr},
@@ -71,14 +76,18 @@ const MeshFormat* format_of(const fs::path& path) {
 
 std::span<const MeshFormat> mesh_formats() { return formats; }
 
-MeshFile read_mesh(const fs::path& path) {
+std::string_view name_of(Dialect dialect) { return dialect == Dialect::calculix ? "CalculiX" : "Abaqus"; }
+
+MeshFile read_mesh(const fs::path& path, const ReadOptions& options) {
   const auto reads = [](const MeshFormat& format) { return format.read != nullptr; };
   const MeshFormat* format = format_of(path);
   if (format == nullptr || !reads(*format)) {
     throw InputError(fmt::format("{}: mesh files of extension \"{}\" are not read; there are {}", path.string(),
                                  path.extension().string(), extensions_with(reads)));
   }
-  return format->read(path);
+  require(!options.dialect || format->read == read_deck,
+          fmt::format("{}: a dialect (calculix, abaqus) is of decks (.inp)", path.string()));
+  return format->read(path, options);
 }
 
 void write_mesh(const fs::path& path, const Mesh& mesh) {

@@ -11,6 +11,16 @@
 
 namespace flexboom {
 
+/// The program that a deck (.inp) is for. Some keywords mean something else in each (README).
+enum class Dialect { calculix, abaqus };
+std::string_view name_of(Dialect);
+
+/// What is said beside a file.
+struct ReadOptions {
+  std::optional<Dialect> dialect;  // of a deck; nothing: what the deck tells, where it matters
+  bool trust = false;              // a .geo file may run commands and write files
+};
+
 /// What a mesh file holds beside the mesh.
 struct MeshFile {
   Mesh mesh;                 // not validated: a material may still be missing
@@ -22,7 +32,7 @@ struct MeshFile {
 struct MeshFormat {
   std::string_view name;
   std::span<const std::string_view> extensions;  // ".inp", ...
-  MeshFile (*read)(const std::filesystem::path&);
+  MeshFile (*read)(const std::filesystem::path&, const ReadOptions&);
   void (*write)(const std::filesystem::path&, const Mesh&);
 };
 
@@ -31,8 +41,9 @@ std::span<const MeshFormat> mesh_formats();
 
 /// Reads a mesh, the format being told by the extension. Nodes that no element uses are kept only where a connection,
 /// mass or set needs them.
-/// @throws InputError with file:line (byte offset in binary files), what was wrong, and what would be right.
-MeshFile read_mesh(const std::filesystem::path&);
+/// @throws InputError with file:line (byte offset in binary files), what was wrong, and what would be right; also where
+/// a dialect is given for a file that is no deck.
+MeshFile read_mesh(const std::filesystem::path&, const ReadOptions& = {});
 
 /// Writes a mesh with its sets, the format being told by the extension.
 /// @throws InputError when the format cannot hold the mesh (saying which element or connection) or the disk refuses.

@@ -21,4 +21,8 @@ std::vector<long> file_labels(const std::vector<long>& labels, size_t count);
 /// and others disagree). Returns their number.
 int turn_wedges(Mesh&);
 
+/// Name of a node set as the mesh spells it. Upper and lower case are alike where one set alone is meant; a name that
+/// is none comes back as it is.
+std::string node_set_name(const Mesh&, const std::string& name);
+
 }  // namespace flexboom

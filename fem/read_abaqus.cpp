@@ -19,7 +19,7 @@ struct Row {
 };
 
 // Keywords that are understood.
-constexpr std::array<Row, 34> table{{
+constexpr std::array<Row, 35> table{{
     {"NODE", read_node},
     {"ELEMENT", read_element},
     {"NSET", read_node_set},
@@ -52,6 +52,7 @@ constexpr std::array<Row, 34> table{{
     {"STATIC", read_static},
     {"FREQUENCY", read_frequency},
     {"INITIALCONDITIONS", read_initial_conditions},
+    {"TEMPERATURE", read_temperature},
     {"ASSEMBLY", [](Deck&, const Keyword&) {}},
     {"ENDASSEMBLY", [](Deck&, const Keyword&) {}},
 }};
@@ -66,6 +67,43 @@ constexpr std::string_view silent[] = {
     "PRINT",        "MONITOR",           "FILEFORMAT",       "TIMEPOINTS",
     "NOANALYSIS",   "USERELEMENTOUTPUT", "INTEGRATEDOUTPUT", "MODALFILE",
     "MODALPRINT",   "FACEPRINT",         "FILEOUTPUT",       "SECTIONFILE",
+};
+
+// Output, matrices, and steps that follow from modes or start from rest and leave the structure as it is.
+constexpr std::string_view passed_over[] = {
+    "MATRIXGENERATE",
+    "MATRIXOUTPUT",
+    "ELEMENTMATRIXOUTPUT",
+    "SUBSTRUCTUREGENERATE",
+    "SUBSTRUCTUREOUTPUT",
+    "SUBSTRUCTUREMATRIXOUTPUT",
+    "SUBSTRUCTURELOADCASE",
+    "ELEMENTRECOVERYMATRIX",
+    "ELEMENTOPERATOROUTPUT",
+    "FLEXIBLEBODY",
+    "RETAINEDNODALDOFS",
+    "SELECTEIGENMODES",
+    "RADIATIONFILE",
+    "RADIATIONPRINT",
+    "RADIATIONOUTPUT",
+    "INCREMENTATIONOUTPUT",
+    "SURFACEOUTPUT",
+    "INTEGRATEDOUTPUTSECTION",
+    "POSTOUTPUT",
+    "EXTREMEVALUE",
+    "FILTER",
+    "DIAGNOSTICS",
+    "VIEWFACTOROUTPUT",
+    "MODALDYNAMIC",
+    "STEADYSTATEDYNAMICS",
+    "COMPLEXFREQUENCY",
+    "RANDOMRESPONSE",
+    "RESPONSESPECTRUM",
+    "GREEN",
+    "SENSITIVITY",
+    "DESIGNVARIABLES",
+    "DESIGNRESPONSE",
+    "OBJECTIVE",
 };
 
 // Keywords without effect on the frequencies of the unloaded structure.
@@ -88,7 +126,6 @@ constexpr std::string_view without_effect[] = {
     "CLOAD",
     "DLOAD",
     "DSLOAD",
-    "TEMPERATURE",
     "CFLUX",
     "DFLUX",
     "FILM",
@@ -128,20 +165,12 @@ constexpr Refusal refusals[] = {
 
 constexpr std::string_view procedures[] = {
     "DYNAMIC",
-    "MODALDYNAMIC",
-    "STEADYSTATEDYNAMICS",
     "HEATTRANSFER",
     "COUPLEDTEMPERATURE-DISPLACEMENT",
     "UNCOUPLEDTEMPERATURE-DISPLACEMENT",
     "VISCO",
-    "COMPLEXFREQUENCY",
-    "GREEN",
-    "SENSITIVITY",
     "ELECTROMAGNETICS",
     "CRACKPROPAGATION",
-    "SUBSTRUCTUREGENERATE",
-    "RANDOMRESPONSE",
-    "RESPONSESPECTRUM",
 };
 
 bool among(std::string_view name, const auto& list) { return std::ranges::count(list, name) > 0; }
@@ -150,6 +179,10 @@ void read_keyword(Deck& deck, const Keyword& keyword) {
   const auto row = std::ranges::find(table, keyword.name, &Row::name);
   if (row != table.end()) return row->read(deck, keyword);
   if (among(keyword.name, silent)) return;
+  if (among(keyword.name, passed_over)) {
+    deck.notes.add(fmt::format("{} asks for output or another step and is passed over", keyword.at));
+    return;
+  }
   if (among(keyword.name, without_effect)) {
     deck.notes.add(fmt::format("{} has no effect on the modes", keyword.at));
     return;
@@ -165,6 +198,22 @@ void read_keyword(Deck& deck, const Keyword& keyword) {
 }
 
 }  // namespace
+
+Dialect Deck::dialect(std::string_view at, std::string_view difference) {
+  if (given_dialect) return *given_dialect;
+  if (!signs_) signs_ = dialect_signs(text_, file_);
+  const auto& [calculix, abaqus] = *signs_;
+  if (calculix.empty() == abaqus.empty())
+    fail(at,
+         fmt::format("{}; {}; say --dialect calculix or --dialect abaqus", difference,
+                     calculix.empty() ? "nothing in the deck tells which of the two it is for"
+                                      : fmt::format("the deck has signs of both, of CalculiX ({}) and of Abaqus ({})",
+                                                    calculix, abaqus)));
+  const Dialect found = calculix.empty() ? Dialect::abaqus : Dialect::calculix;
+  notes.add(fmt::format("{}; read as {} does, which the deck is for ({})", difference, name_of(found),
+                        calculix.empty() ? abaqus : calculix));
+  return found;
+}
 
 double Deck::real(std::string_view field, std::string_view what) {
   if (field.size() > calculix_number && !has_long_number) {
@@ -215,8 +264,8 @@ std::optional<long> Deck::number(const Reference& reference) const {
 
 }  // namespace abaqus
 
-MeshFile read_abaqus(std::string_view text, const std::string& file) {
-  abaqus::Deck deck(text, file);
+MeshFile read_abaqus(std::string_view text, const std::string& file, std::optional<Dialect> dialect) {
+  abaqus::Deck deck(text, file, dialect);
   if (deck.lines.next_data() != nullptr)
     deck.fail(deck.lines.line(),
               fmt::format("a deck begins with a keyword such as *NODE, not with {}", quoted(deck.lines.line())));

@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
+#include <set>
 
 namespace flexboom::abaqus {
 namespace {
@@ -33,6 +35,7 @@ class Connections {
 
   void add_rigid(const Rigid&);
   void add_distributing(const DistributingElements&);
+  void add_mean(const DistributingConnection&);
   std::vector<double> area_weights(const SurfaceParts&) const;
   void add_mpc(const Mpc&);
   void add_pair(const Mpc&, int follower, int leader);
@@ -44,13 +47,15 @@ class Connections {
   Freedom freedom(const Reference&, int node, int component) const;
   void append(LinearEquation&, const Freedom&, double coefficient) const;
   void hold(const Freedom&, std::string_view where);
+  bool is_idle_rotation(int node, int component, std::string_view where);
 
   const Lookup& lookup_;
   Deck& deck_;
   Mesh& mesh_;
-  std::map<int, int> rotation_of_;  // rotation node to reference node
-  std::vector<char> rotates_;       // nodes with rotations
-  std::vector<int> transform_;      // of each node, -1
+  std::map<int, int> rotation_of_;       // rotation node to reference node
+  std::set<int> without_rotation_node_;  // reference nodes of rigid bodies
+  std::vector<char> rotates_;            // nodes with rotations
+  std::vector<int> transform_;           // of each node, -1
 };
 
 void Connections::add_all() {
@@ -67,7 +72,10 @@ void Connections::add_all() {
 
 void Connections::add_rigid(const Rigid& rigid) {
   const int reference = lookup_.node(rigid.reference);
-  if (rigid.rotation) rotation_of_[lookup_.node(*rigid.rotation)] = reference;
+  if (rigid.rotation)
+    rotation_of_[lookup_.node(*rigid.rotation)] = reference;
+  else if (rigid.surface.text.empty())
+    without_rotation_node_.insert(reference);
   std::vector<int> nodes;
   SurfaceParts surface;
   if (!rigid.surface.text.empty()) {
@@ -126,8 +134,28 @@ void Connections::add_distributing(const DistributingElements& coupling) {
       connection.nodes.push_back(node);
       connection.weights.push_back(weight);
     }
-    mesh_.distributing_connections.push_back(std::move(connection));
+    if (coupling.dialect == Dialect::calculix)
+      add_mean(connection);
+    else
+      mesh_.distributing_connections.push_back(std::move(connection));
   }
+}
+
+/// CalculiX: the displacement of the reference node is the weighted mean, its rotations are left alone.
+void Connections::add_mean(const DistributingConnection& c) {
+  for (int k = 0; k < 3; ++k) {
+    LinearEquation equation{{{c.reference, k, std::accumulate(c.weights.begin(), c.weights.end(), 0.0)}}};
+    for (size_t i = 0; i < c.nodes.size(); ++i) equation.terms.push_back({c.nodes[i], k, -c.weights[i]});
+    mesh_.equations.push_back(std::move(equation));
+  }
+}
+
+/// Whether a degree of freedom 4 to 6 of a node is that of a rigid body whose rotations CalculiX keeps elsewhere.
+bool Connections::is_idle_rotation(int node, int component, std::string_view where) {
+  return component >= 3 && without_rotation_node_.contains(node) &&
+         deck_.dialect(where,
+                       "degrees of freedom 4 to 6 of the reference node of a *RIGID BODY turn it in Abaqus and do "
+                       "nothing in CalculiX, which has a ROT NODE for them") == Dialect::calculix;
 }
 
 void Connections::find_axes() {
@@ -200,9 +228,10 @@ void Connections::add_equation(const Equation& lines) {
       if (follows.component >= 3 && !rotates_[at(follows.node)])
         deck_.fail(term.node.text, fmt::format("node {} of the equation has no rotations (degrees of freedom 4 to 6)",
                                                mesh_.node_label(follows.node)));
+      if (is_idle_rotation(follows.node, follows.component, term.node.text) && !rotation_of_.contains(nodes[t][0]))
+        deck_.fail(term.node.text, "CalculiX has the rotations of a rigid body in the ROT NODE alone; give it one");
       append(equation, follows, term.coefficient);
     }
-    if (equation.terms.empty()) deck_.fail(lines.at, "the equation has no coefficient other than zero");
     mesh_.equations.push_back(std::move(equation));
   }
 }
@@ -297,6 +326,7 @@ void Connections::add_supports() {
     for (const int node : lookup_.nodes(boundary.nodes)) {
       for (int component = boundary.first - 1; component < boundary.last; ++component) {
         if (component >= 3 && rotation_of_.contains(node)) continue;
+        if (is_idle_rotation(node, component, boundary.at)) continue;
         const Freedom follows = freedom(boundary.nodes, node, component);
         if (follows.component >= 3 && !rotates_[at(follows.node)]) continue;  // of a solid, as CalculiX does
         held[at(follows.node)][at(follows.component)] = true;

@@ -4,8 +4,6 @@
 
 #include <Eigen/Geometry>
 
-#include <array>
-
 // Supports and connections.
 namespace flexboom::abaqus {
 namespace {
@@ -15,32 +13,14 @@ using Fields = std::vector<std::string_view>;
 
 constexpr int temperature_freedom = 11;
 
-struct NamedSupport {
-  std::string_view name, components;
-};
-constexpr std::array<NamedSupport, 8> named_supports{{
-    {"ENCASTRE", "123456"},
-    {"PINNED", "123"},
-    {"XSYMM", "156"},
-    {"YSYMM", "246"},
-    {"ZSYMM", "345"},
-    {"XASYMM", "234"},
-    {"YASYMM", "135"},
-    {"ZASYMM", "126"},
-}};
-
-bool named_support(Deck& deck, const Fields& fields) {
-  if (fields.size() < 2) return false;
-  const std::string name = upper_key(fields[1]);
-  for (const NamedSupport& support : named_supports) {
-    if (support.name != name) continue;
-    for (const char digit : support.components) {
-      const int component = digit - '0';
-      deck.boundaries.push_back({deck.reference(unquoted(fields[0])), component, component, fields[0]});
-    }
-    return true;
+bool hold_named(Deck& deck, const Fields& fields) {
+  const auto components = fields.size() < 2 ? std::nullopt : named_support(fields[1]);
+  if (!components) return false;
+  for (const char digit : *components) {
+    const int component = digit - '0';
+    deck.boundaries.push_back({deck.reference(unquoted(fields[0])), component, component, fields[0]});
   }
-  return false;
+  return true;
 }
 
 /// Lines "first, last" of degrees of freedom. @returns false if there was none.
@@ -70,7 +50,7 @@ void read_boundary(Deck& deck, const Keyword& keyword) {
     deck.cleared = true;
   }
   while (const Fields* fields = deck.lines.next_data()) {
-    if (named_support(deck, *fields)) continue;
+    if (hold_named(deck, *fields)) continue;
     if (fields->size() < 2) deck.fail(deck.lines.line(), "*BOUNDARY needs a node or set and a degree of freedom");
     const DeckText& text = deck.lines.text();
     const long first = text.integer((*fields)[1], "degree of freedom");
@@ -132,6 +112,15 @@ void read_coupling(Deck& deck, const Keyword& keyword) {
     deck.lines.allow(*kind, {});
   }
   const bool listed = read_components(deck, coupling.components, 6);
+  if (!listed) {
+    const Dialect dialect = deck.dialect(
+        kind->at, coupling.distributing
+                      ? "*DISTRIBUTING without degrees of freedom couples all six in Abaqus and 1 to 3 in CalculiX"
+                      : "*KINEMATIC without degrees of freedom couples all six in Abaqus and none in CalculiX");
+    if (dialect == Dialect::calculix) coupling.components = translations();
+    if (dialect == Dialect::calculix && !coupling.distributing)
+      deck.fail(kind->at, "*KINEMATIC: the degrees of freedom are missing; CalculiX couples nothing");
+  }
   if (coupling.distributing) {
     // Translations always follow, and rotations together or not at all.
     const Components& c = coupling.components;
@@ -140,6 +129,8 @@ void read_coupling(Deck& deck, const Keyword& keyword) {
     coupling.components[0] = coupling.components[1] = coupling.components[2] = true;
   } else {
     const Components& c = coupling.components;
+    if (deck.given_dialect == Dialect::calculix && (c[3] || c[4] || c[5]))
+      deck.fail(kind->at, "*KINEMATIC takes degrees of freedom 1 to 3 in CalculiX");
     if (turned && !(c[0] && c[1] && c[2]))
       deck.fail(keyword.at, "*COUPLING with ORIENTATION is understood if it takes degrees of freedom 1 to 3");
   }
@@ -148,7 +139,11 @@ void read_coupling(Deck& deck, const Keyword& keyword) {
 
 void read_distributing_coupling(Deck& deck, const Keyword& keyword) {
   deck.lines.allow(keyword, {"ELSET"});
-  DistributingElements coupling{deck.reference(deck.lines.need(keyword, "ELSET")), {}, keyword.at};
+  const Dialect dialect = deck.dialect(
+      keyword.at,
+      "the reference node of *DISTRIBUTING COUPLING follows the rigid motion that fits in Abaqus, and the mean "
+      "displacement alone in CalculiX");
+  DistributingElements coupling{deck.reference(deck.lines.need(keyword, "ELSET")), dialect, {}, keyword.at};
   while (const Fields* fields = deck.lines.next_data()) {
     const double weight = fields->size() > 1 ? deck.real((*fields)[1], "weight") : 1;
     if (weight <= 0) deck.fail((*fields)[1], "a weight must be positive");
@@ -173,8 +168,14 @@ void read_equation(Deck& deck, const Keyword& keyword) {
         deck.fail(deck.lines.line(), "an equation has three fields per term: node, degree of freedom, coefficient");
       for (size_t i = 0; i < fields->size(); i += 3) {
         const long component = deck.lines.text().integer((*fields)[i + 1], "degree of freedom", 1, 6);
-        equation.terms.push_back({deck.reference(unquoted((*fields)[i])), static_cast<int>(component),
-                                  deck.real((*fields)[i + 2], "coefficient")});
+        const double coefficient = deck.real((*fields)[i + 2], "coefficient");
+        if (coefficient == 0 && equation.terms.empty())
+          deck.fail((*fields)[i + 2],
+                    "the first coefficient of an equation must not be zero: its freedom follows the others");
+        if (coefficient == 0)
+          deck.notes.add(fmt::format("{}: a term of the equation has the coefficient zero and is left out",
+                                     deck.lines.text().line_location((*fields)[i + 2])));
+        equation.terms.push_back({deck.reference(unquoted((*fields)[i])), static_cast<int>(component), coefficient});
       }
     }
     if (std::ssize(equation.terms) > count)
@@ -191,8 +192,14 @@ void read_mpc(Deck& deck, const Keyword& keyword) {
       deck.fail((*fields)[0],
                 fmt::format("*MPC {} is not understood; there are BEAM, TIE, PIN, LINK", quoted((*fields)[0])));
     if (fields->size() != 3) deck.fail(deck.lines.line(), fmt::format("*MPC {} needs two nodes or sets", type));
-    deck.mpcs.push_back(
-        {type, deck.reference(unquoted((*fields)[1])), deck.reference(unquoted((*fields)[2])), (*fields)[0]});
+    const bool keeps_distance =
+        type == "BEAM" &&
+        deck.dialect((*fields)[0], "*MPC BEAM is a rigid beam in Abaqus and keeps a distance alone in CalculiX") ==
+            Dialect::calculix;
+    if (type != "BEAM" && deck.given_dialect == Dialect::calculix)
+      deck.fail((*fields)[0], fmt::format("*MPC {} is not known to CalculiX", type));
+    deck.mpcs.push_back({keeps_distance ? "LINK" : type, deck.reference(unquoted((*fields)[1])),
+                         deck.reference(unquoted((*fields)[2])), (*fields)[0]});
   }
 }
 

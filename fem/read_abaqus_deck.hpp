@@ -1,6 +1,7 @@
 #pragma once
 
 #include "fem/mesh_file.hpp"
+#include "fem/read_abaqus_dialect.hpp"
 #include "fem/read_abaqus_lines.hpp"
 
 #include <array>
@@ -23,6 +24,7 @@ struct ElementKind {
   std::string_view row;   // of the table of elements
   int nodes;
   Role role;
+  std::string_view note = {};  // where it is not what the programs of decks compute
 };
 
 /// Numbers of nodes and elements are negative where they belong to the assembly of a deck with a part.
@@ -65,9 +67,24 @@ struct Surface {
   std::string_view at;
 };
 
+/// By temperature, ascending; one row where it does not count.
+struct ElasticRow {
+  double temperature, E, nu;
+};
+struct DensityRow {
+  double temperature, rho;
+};
 struct MaterialLines {
   std::string name;
-  std::optional<double> E, nu, rho;
+  std::vector<ElasticRow> elastic;
+  std::vector<DensityRow> density;
+
+  bool depends_on_temperature() const { return elastic.size() > 1 || density.size() > 1; }
+};
+
+struct InitialTemperature {
+  Reference nodes;
+  double temperature;
 };
 
 struct SectionLine {
@@ -97,6 +114,7 @@ struct Rigid {
 
 struct DistributingElements {
   Reference elements;
+  Dialect dialect;
   std::vector<std::pair<Reference, double>> weights;
   std::string_view at;
 };
@@ -139,9 +157,14 @@ struct Instance {
 };
 
 struct Deck {
-  Deck(std::string_view text, const std::string& file) : lines(text, file) {}
+  Deck(std::string_view text, const std::string& file, std::optional<Dialect> dialect)
+      : lines(text, file), given_dialect(dialect), text_(text), file_(file) {}
 
   [[noreturn]] void fail(std::string_view at, const std::string& message) const { lines.text().fail(at, message); }
+
+  /// The program that the deck is for, asked where a keyword means something else to each.
+  /// @throws InputError with the difference where the deck does not tell.
+  Dialect dialect(std::string_view at, std::string_view difference);
 
   /// A field as a number. @throws InputError naming `what` should be there.
   double real(std::string_view field, std::string_view what);
@@ -159,6 +182,7 @@ struct Deck {
   std::optional<long> number(const Reference&) const;
 
   Lines lines;
+  std::optional<Dialect> given_dialect;
   Notes notes;
   bool has_long_number = false;  // one that CalculiX cuts off
 
@@ -166,7 +190,8 @@ struct Deck {
   std::vector<ElementLine> elements;
   std::vector<long> element_nodes;
   Sets node_sets, element_sets;
-  size_t looked_up = 0;       // members of sets handed out
+  size_t looked_up = 0;       // members of sets made and handed out
+  long generated = 0;         // numbers that GENERATE went through
   size_t copied_members = 0;  // of sets into sets
   std::map<std::string, Surface> surfaces;
   std::map<std::string, MaterialLines> materials;
@@ -180,6 +205,9 @@ struct Deck {
   std::vector<Mpc> mpcs;
   std::vector<Tie> ties;
   std::vector<Transform> transforms;
+  std::vector<InitialTemperature> initial_temperatures;
+  std::string_view temperature_file;  // an initial temperature that is in another file
+  std::string_view step_temperature;  // a *TEMPERATURE of a step
 
   bool has_part = false, in_part = false;
   std::optional<Instance> instance;
@@ -190,6 +218,11 @@ struct Deck {
   bool frequencies = false;                      // a step asks for them
   bool finished = false;                         // and has ended
   std::optional<int> modes;
+
+ private:
+  std::string_view text_;
+  std::string file_;
+  std::optional<DialectSigns> signs_;  // once they are asked for
 };
 
 // Readers of keywords, one each; the table in read_abaqus.cpp names them.
@@ -224,6 +257,7 @@ void read_end_step(Deck&, const Keyword&);
 void read_static(Deck&, const Keyword&);
 void read_frequency(Deck&, const Keyword&);
 void read_initial_conditions(Deck&, const Keyword&);
+void read_temperature(Deck&, const Keyword&);
 
 /// Mesh of a deck that has been read.
 MeshFile mesh_of(Deck&);

@@ -29,6 +29,7 @@ std::optional<std::string_view> Lines::peek() {
   while (const auto raw = text_.peek_line()) {
     const std::string_view line = trimmed(*raw);
     if (line.empty() || line.starts_with("**")) {
+      if (comments != nullptr && !line.empty()) comments->push_back(line);
       text_.skip_line();
       continue;
     }

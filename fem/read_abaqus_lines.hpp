@@ -40,6 +40,9 @@ class Lines {
   /// Fields of the next data line, or null when a keyword or the end comes next. Good until the next call.
   const std::vector<std::string_view>* next_data();
 
+  /// Where comments are collected, if anywhere.
+  std::vector<std::string_view>* comments = nullptr;
+
   /// The last data line, and whether it ended with a comma.
   std::string_view line() const { return line_; }
   bool continues() const { return line_.ends_with(','); }

@@ -14,11 +14,15 @@ namespace {
 constexpr long most_generated = 50'000'000;
 constexpr size_t most_looked_up = 200'000'000;  // members of all sets that connections and sections name
 
-/// Keeps a small deck that names large sets again and again from filling the memory.
-const std::vector<int>& handed_out(Deck& deck, const Reference& reference, const std::vector<int>& members) {
-  deck.looked_up += members.size();
+/// Keeps a small deck that makes or names large sets again and again from filling the memory.
+void count_members(Deck& deck, size_t members, std::string_view at) {
+  deck.looked_up += members;
   if (deck.looked_up > most_looked_up)
-    deck.fail(reference.text, fmt::format("the sets named so far have more than {} members", most_looked_up));
+    deck.fail(at, fmt::format("the sets named so far have more than {} members", most_looked_up));
+}
+
+const std::vector<int>& handed_out(Deck& deck, const Reference& reference, const std::vector<int>& members) {
+  count_members(deck, members.size(), reference.text);
   return members;
 }
 
@@ -41,6 +45,7 @@ Lookup::Lookup(Deck& deck) : deck_(deck) {
         const ElementLine& line = deck.elements[at(e)];
         nodes.insert(nodes.end(), nodes_of(line), nodes_of(line) + line.kind->nodes);
       }
+      count_members(deck, nodes.size(), of.text);
     }
     node_sets_[key] = sorted_unique(std::move(nodes));
   }
@@ -101,7 +106,6 @@ std::vector<int> Lookup::members(const Set& set, const LabelIndex& index, std::s
     const auto ends = std::ranges::minmax(labels);
     return std::pair(ends.min, ends.max);
   }();
-  long generated = 0;
   for (const LabelRange& range : set.ranges) {
     if (!range.generated) {
       const int found = index.find(range.first);
@@ -113,14 +117,15 @@ std::vector<int> Lookup::members(const Set& set, const LabelIndex& index, std::s
     long first = range.first;
     if (first < lowest) first += (lowest - first + range.step - 1) / range.step * range.step;
     const long last = std::min(range.last, highest);
-    if (first <= last) generated += (last - first) / range.step;
-    if (generated > most_generated)
-      deck_.fail(range.at,
-                 fmt::format("set {}: more than {} numbers are generated", flexboom::quoted(set.name), most_generated));
+    if (first <= last) deck_.generated += (last - first) / range.step;
+    if (deck_.generated > most_generated)
+      deck_.fail(range.at, fmt::format("set {}: more than {} numbers are generated up to here",
+                                       flexboom::quoted(set.name), most_generated));
     for (long label = first; label <= last; label += range.step) {
       if (const int found = index.find(label); found >= 0) result.push_back(found);
     }
   }
+  count_members(deck_, result.size(), set.ranges.front().at);
   return sorted_unique(std::move(result));
 }
 

@@ -16,31 +16,114 @@ using Eigen::Vector3d;
 
 constexpr int beam_order = 4;  // of which one element is converged where a deck has many
 
-Material material_of(const Deck& deck, const SectionLine& section) {
+/// A value between the rows of a table, that of an end beyond it.
+template <class Row>
+double value_at(const std::vector<Row>& rows, double Row::*value, double temperature) {
+  const auto above = std::ranges::upper_bound(rows, temperature, {}, &Row::temperature);
+  if (above == rows.begin()) return rows.front().*value;
+  if (above == rows.end()) return rows.back().*value;
+  const Row &a = *std::prev(above), &b = *above;
+  return a.*value + (b.*value - a.*value) * (temperature - a.temperature) / (b.temperature - a.temperature);
+}
+
+/// Initial temperatures of nodes, zero where none is given, as in both programs.
+class Temperatures {
+ public:
+  explicit Temperatures(const Lookup& lookup) : lookup_(lookup) {}
+
+  /// The temperature that all elements of a section start with. @throws InputError if they differ.
+  double of(const SectionLine& section, const MaterialLines& material) {
+    Deck& deck = lookup_.deck();
+    const std::string name = flexboom::quoted(material.name);
+    if (!deck.temperature_file.empty())
+      deck.fail(deck.temperature_file,
+                fmt::format("material {} depends on temperature; write the initial temperatures out", name));
+    if (!deck.step_temperature.empty() &&
+        deck.dialect(deck.step_temperature,
+                     fmt::format("material {} depends on temperature, which is that of the last step in Abaqus and the "
+                                 "initial one in CalculiX",
+                                 name)) == Dialect::abaqus)
+      deck.fail(
+          deck.step_temperature,
+          fmt::format("material {} depends on the temperature of this step, which is not understood; give it that "
+                      "as its initial temperature",
+                      name));
+    read();
+    double lowest = 0, highest = 0;
+    bool first = true;
+    for (const int e : lookup_.elements(section.elements)) {
+      const ElementLine& line = deck.elements[at(e)];
+      for (int k = 0; k < line.kind->nodes; ++k) {
+        const double t = of_node_[at(lookup_.nodes_of(line)[k])];
+        lowest = first ? t : std::min(lowest, t);
+        highest = first ? t : std::max(highest, t);
+        first = false;
+      }
+    }
+    if (lowest != highest)
+      deck.fail(section.at,
+                fmt::format("material {} depends on temperature, and these elements start between {} and {}; "
+                            "give each temperature a section of its own",
+                            name, lowest, highest));
+    deck.notes.add(fmt::format("material {} depends on temperature: it is taken at the initial temperature, {}{}", name,
+                               lowest, deck.initial_temperatures.empty() ? " where none is given" : ""));
+    return lowest;
+  }
+
+ private:
+  void read() {
+    if (!of_node_.empty()) return;
+    of_node_.assign(lookup_.deck().nodes.labels().size(), 0);
+    for (const InitialTemperature& line : lookup_.deck().initial_temperatures) {
+      for (const int node : lookup_.nodes(line.nodes)) of_node_[at(node)] = line.temperature;
+    }
+  }
+
+  const Lookup& lookup_;
+  std::vector<double> of_node_;
+};
+
+const MaterialLines& material_lines(const Deck& deck, const SectionLine& section) {
   const auto found = deck.materials.find(section.material);
   if (found == deck.materials.end())
     deck.fail(section.at, fmt::format("material {} is not defined", flexboom::quoted(section.material)));
-  const MaterialLines& lines = found->second;
-  if (!lines.E) deck.fail(section.at, fmt::format("material {} has no *ELASTIC", flexboom::quoted(lines.name)));
-  return {*lines.E, *lines.nu, lines.rho.value_or(0)};
+  if (found->second.elastic.empty())
+    deck.fail(section.at, fmt::format("material {} has no *ELASTIC", flexboom::quoted(found->second.name)));
+  return found->second;
 }
 
-/// Properties of the sections: solids share one per material, beams have one each.
-std::vector<int> add_properties(Deck& deck, Mesh& mesh) {
+/// Properties of the sections: solids share one per material and temperature, beams have one each.
+std::vector<int> add_properties(const Lookup& lookup, Mesh& mesh) {
+  Deck& deck = lookup.deck();
+  Temperatures temperatures(lookup);
   std::vector<int> property;
-  std::map<std::string, int> solids;
+  std::map<std::pair<std::string, double>, int> solids;
   for (SectionLine& section : deck.sections) {
-    const Material material = section.material.empty() ? section.beam.material : material_of(deck, section);
-    if (!section.material.empty() && !deck.materials[section.material].rho)
-      deck.notes.add(fmt::format("material {} has no *DENSITY: it weighs nothing", flexboom::quoted(section.material)));
+    Material material = section.beam.material;
+    double temperature = 0;
+    std::string name;
+    if (!section.material.empty()) {
+      const MaterialLines& lines = material_lines(deck, section);
+      name = lines.name;
+      if (lines.depends_on_temperature()) {
+        temperature = temperatures.of(section, lines);
+        name += fmt::format("_{}", temperature);
+      }
+      material = {value_at(lines.elastic, &ElasticRow::E, temperature),
+                  value_at(lines.elastic, &ElasticRow::nu, temperature),
+                  lines.density.empty() ? 0 : value_at(lines.density, &DensityRow::rho, temperature)};
+      if (lines.density.empty())
+        deck.notes.add(fmt::format("material {} has no *DENSITY: it weighs nothing", flexboom::quoted(name)));
+    }
     if (section.role == Role::beam) {
       property.push_back(static_cast<int>(mesh.beam_properties.size()));
       section.beam.material = material;
       mesh.beam_properties.push_back(section.beam);
       continue;
     }
-    const auto [place, is_new] = solids.try_emplace(section.material, static_cast<int>(mesh.solid_properties.size()));
-    if (is_new) mesh.solid_properties.push_back({deck.materials[section.material].name, material});
+    const auto [place, is_new] =
+        solids.try_emplace({section.material, temperature}, static_cast<int>(mesh.solid_properties.size()));
+    if (is_new) mesh.solid_properties.push_back({name, material});
     property.push_back(place->second);
   }
   return property;
@@ -99,7 +182,7 @@ void add_element(const Lookup& lookup, Mesh& mesh, const ElementLine& line, int 
 
 void add_elements(Lookup& lookup, Mesh& mesh) {
   Deck& deck = lookup.deck();
-  const std::vector<int> property = add_properties(deck, mesh);
+  const std::vector<int> property = add_properties(lookup, mesh);
   assign_sections(lookup);
   const bool without_sections = deck.sections.empty() && deck.materials.empty();
   std::map<std::string_view, int> types;
@@ -188,13 +271,13 @@ void add_sets(const Lookup& lookup, Mesh& mesh) {
     if (!elements.empty()) {
       mesh.element_sets[name] = std::move(elements);
     } else if (!nodes.empty()) {  // a group of a mesh generator on a surface or line
-      mesh.node_sets.try_emplace(name, sorted_unique(std::move(nodes)));
+      mesh.node_sets.try_emplace(node_set_name(mesh, name), sorted_unique(std::move(nodes)));
     }
   }
   for (const auto& [key, surface] : deck.surfaces) {
     const SurfaceParts parts = surface_parts(lookup, mesh, surface);
-    if (!parts.nodes.empty())
-      mesh.node_sets.try_emplace(exported_name(deck, key, surface.name, deck.surfaces), parts.nodes);
+    const std::string name = exported_name(deck, key, surface.name, deck.surfaces);
+    if (!parts.nodes.empty()) mesh.node_sets.try_emplace(node_set_name(mesh, name), parts.nodes);
   }
 }
 

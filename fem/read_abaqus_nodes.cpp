@@ -18,14 +18,25 @@ constexpr size_t most_copied_members = 10'000'000;
 constexpr int degrees_per_half_turn = 180;
 
 constexpr std::array<ElementKind, 49> kinds{{
-    {"C3D4", "tet4", 4, Role::solid},
+    {"C3D4", "tet4", 4, Role::solid,
+     "C3D4 has the mass of more points than in CalculiX, whose one point loses the element's own inertia: coarse "
+     "meshes "
+     "differ"},
     {"C3D10", "tet10", 10, Role::solid},
-    {"C3D8", "hex8", 8, Role::solid},
-    {"C3D8I", "hex8", 8, Role::solid},
-    {"C3D8R", "hex8-reduced", 8, Role::solid},
+    {"C3D8", "hex8", 8, Role::solid, "C3D8 is computed with incompatible modes, as C3D8I is: it does not lock"},
+    {"C3D8I", "hex8", 8, Role::solid,
+     "C3D8I is computed with twelve enhanced strains (Q1/E12), not with those of CalculiX or Abaqus: coarse meshes "
+     "differ"},
+    {"C3D8R", "hex8-reduced", 8, Role::solid,
+     "C3D8R is computed with its mean gradient and enhanced strains against hourglass motions, which CalculiX leaves "
+     "free "
+     "and Abaqus holds otherwise"},
     {"C3D20", "hex20", 20, Role::solid},
     {"C3D20R", "hex20-reduced", 20, Role::solid},
-    {"C3D6", "wedge6", 6, Role::solid},
+    {"C3D6", "wedge6", 6, Role::solid,
+     "C3D6 is held against the motion without stiffness of its two points and has the mass of more points than in "
+     "CalculiX: "
+     "coarse meshes differ"},
     {"C3D15", "wedge15", 15, Role::solid},
     {"B31", "beam-timoshenko", 2, Role::beam},
     {"B31R", "beam-timoshenko", 2, Role::beam},
@@ -192,9 +203,12 @@ void read_element(Deck& deck, const Keyword& keyword) {
   deck.lines.allow(keyword, {"TYPE", "ELSET", "FILE", "UNSYMM"});
   const ElementKind& kind = kind_of(deck, deck.lines.need(keyword, "TYPE"));
   Set* set = set_of(deck, deck.element_sets, keyword, "ELSET");
-  if (kind.name == "C3D8") deck.notes.add("C3D8 is computed with incompatible modes, as C3D8I is: it does not lock");
+  if (!kind.note.empty()) deck.notes.add(std::string(kind.note));
   if (kind.role == Role::beam)
-    deck.notes.add(fmt::format("{} is computed as a Timoshenko beam; CalculiX makes a solid of it", kind.name));
+    deck.notes.add(
+        fmt::format("{} is computed as a Timoshenko beam with its full mass; CalculiX makes a solid of it, Abaqus "
+                    "lumps the mass of B31",
+                    kind.name));
   while (const Fields* fields = deck.lines.next_data()) {
     const std::string_view at = (*fields)[0];
     const long label = deck.label(at, "number of an element");

@@ -24,10 +24,17 @@ const Fields& need_data(Deck& deck, const Keyword& keyword, std::string_view wha
   return *fields;
 }
 
-void skip_rows(Deck& deck, const Keyword& keyword) {
-  if (deck.lines.next_data() != nullptr)
-    deck.notes.add(fmt::format("{} depends on temperature: the first row is used", keyword.at));
-  while (deck.lines.next_data() != nullptr) continue;
+/// The temperature of a row of a material, above that of the row before.
+template <class Row>
+double row_temperature(Deck& deck, const Keyword& keyword, const Fields& fields, size_t place,
+                       const std::vector<Row>& before) {
+  const double temperature = deck.real_or_zero(fields, place, "temperature");
+  if (before.empty()) return temperature;
+  if (keyword.has("DEPENDENCIES"))
+    deck.fail(keyword.at, fmt::format("{}: DEPENDENCIES on field variables are not understood", keyword.at));
+  if (temperature <= before.back().temperature)
+    deck.fail(deck.lines.line(), fmt::format("{}: the temperatures must ascend from row to row", keyword.at));
+  return temperature;
 }
 
 /// Dimensions of a line, all positive.
@@ -42,13 +49,16 @@ std::vector<double> dimensions(Deck& deck, const Keyword& keyword, const Fields&
   return values;
 }
 
-// CalculiX takes the two full axes of SECTION=CIRC, Abaqus one radius.
+// CalculiX takes the two full axes of SECTION=CIRC, the second being the first where it is not given; Abaqus one
+// radius.
 SectionShape round_bar(Deck& deck, const std::vector<double>& d, std::string_view at) {
   if (d.size() == 1) {
-    deck.notes.add("SECTION=CIRC with one number is read as Abaqus does: a radius");
-    return RoundBar{2 * d[0]};
+    const Dialect dialect =
+        deck.dialect(at, "SECTION=CIRC with one number is a diameter in CalculiX and a radius in Abaqus");
+    return RoundBar{dialect == Dialect::calculix ? d[0] : 2 * d[0]};
   }
-  deck.notes.add("SECTION=CIRC is read as CalculiX does: two diameters, not radii");
+  if (deck.given_dialect == Dialect::abaqus) deck.fail(at, "SECTION=CIRC takes one number in Abaqus, the radius");
+  deck.notes.add("SECTION=CIRC with two numbers is read as CalculiX does: diameters, not radii");
   if (d.size() != 2 || d[0] != d[1])
     deck.fail(at, "SECTION=CIRC needs two equal diameters (ellipses are not understood)");
   return RoundBar{d[0]};
@@ -103,8 +113,7 @@ SectionLine section_line(Deck& deck, const Keyword& keyword, Role role) {
 void read_material(Deck& deck, const Keyword& keyword) {
   deck.lines.allow(keyword, {"NAME"});
   const std::string_view name = deck.lines.need(keyword, "NAME");
-  const auto [place, is_new] =
-      deck.materials.try_emplace(upper_key(name), MaterialLines{std::string(name), {}, {}, {}});
+  const auto [place, is_new] = deck.materials.try_emplace(upper_key(name), MaterialLines{std::string(name), {}, {}});
   if (!is_new) deck.fail(keyword.at, fmt::format("material {} is defined twice", quoted(name)));
   deck.material = &place->second;
 }
@@ -115,22 +124,32 @@ void read_elastic(Deck& deck, const Keyword& keyword) {
   const std::string type = upper_key(keyword.find("TYPE").value_or("ISO"));
   if (type != "ISO" && type != "ISOTROPIC")
     deck.fail(keyword.at, fmt::format("*ELASTIC, TYPE={} is not understood; materials are isotropic (TYPE=ISO)", type));
-  const Fields& fields = need_data(deck, keyword, "Young's modulus and Poisson's ratio");
-  material.E = deck.real(fields[0], "Young's modulus");
-  material.nu = deck.real_or_zero(fields, 1, "Poisson's ratio");
-  if (*material.E <= 0) deck.fail(fields[0], "Young's modulus must be positive");
-  if (*material.nu <= -1 || *material.nu >= 0.5)
-    deck.fail(fields[1], fmt::format("Poisson's ratio is {}; it must lie between -1 and 0.5", *material.nu));
-  skip_rows(deck, keyword);
+  material.elastic.clear();
+  for (const Fields* fields = &need_data(deck, keyword, "Young's modulus and Poisson's ratio"); fields != nullptr;
+       fields = deck.lines.next_data()) {
+    ElasticRow row{};
+    row.E = deck.real((*fields)[0], "Young's modulus");
+    row.nu = deck.real_or_zero(*fields, 1, "Poisson's ratio");
+    row.temperature = row_temperature(deck, keyword, *fields, 2, material.elastic);
+    if (row.E <= 0) deck.fail((*fields)[0], "Young's modulus must be positive");
+    if (row.nu <= -1 || row.nu >= 0.5)
+      deck.fail((*fields)[1], fmt::format("Poisson's ratio is {}; it must lie between -1 and 0.5", row.nu));
+    material.elastic.push_back(row);
+  }
 }
 
 void read_density(Deck& deck, const Keyword& keyword) {
   deck.lines.allow(keyword, {"DEPENDENCIES"});
   MaterialLines& material = material_of(deck, keyword);
-  const Fields& fields = need_data(deck, keyword, "the density");
-  material.rho = deck.real(fields[0], "density");
-  if (*material.rho < 0) deck.fail(fields[0], "the density must not be negative");
-  skip_rows(deck, keyword);
+  material.density.clear();
+  for (const Fields* fields = &need_data(deck, keyword, "the density"); fields != nullptr;
+       fields = deck.lines.next_data()) {
+    DensityRow row{};
+    row.rho = deck.real((*fields)[0], "density");
+    row.temperature = row_temperature(deck, keyword, *fields, 1, material.density);
+    if (row.rho < 0) deck.fail((*fields)[0], "the density must not be negative");
+    material.density.push_back(row);
+  }
 }
 
 void read_solid_section(Deck& deck, const Keyword& keyword) {

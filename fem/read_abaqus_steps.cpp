@@ -49,15 +49,34 @@ void read_frequency(Deck& deck, const Keyword& keyword) {
     return;
   }
   deck.modes = static_cast<int>(deck.lines.text().integer((*fields)[0], "number of modes", 1, 1'000'000));
-  for (size_t i = 1; i < fields->size() && i < 3; ++i) {
-    if (deck.real_or_zero(*fields, i, "frequency") != 0)
-      deck.notes.add("*FREQUENCY: limits of frequency are left out; the lowest modes are computed");
+  for (size_t i = 1; i < fields->size() && i < 4; ++i) {
+    if (deck.real_or_zero(*fields, i, "frequency") == 0) continue;
+    deck.notes.add(i < 3
+                       ? "*FREQUENCY: limits of frequency are left out; the lowest modes are computed"
+                       : "*FREQUENCY: the fourth field is left out; CalculiX adds mass by it (selective mass scaling), "
+                         "Abaqus computes the modes near it (shift), here the lowest modes are computed as they are");
   }
+}
+
+// The start of materials that depend on temperature; it loads nothing.
+void read_initial_temperatures(Deck& deck, const Keyword& keyword) {
+  if (keyword.has("FILE")) deck.temperature_file = keyword.at;
+  while (const auto* fields = deck.lines.next_data()) {
+    deck.initial_temperatures.push_back(
+        {deck.reference(unquoted((*fields)[0])), deck.real_or_zero(*fields, 1, "initial temperature")});
+  }
+  deck.notes.add("initial temperatures count where a material depends on temperature");
+}
+
+void read_temperature(Deck& deck, const Keyword& keyword) {
+  deck.step_temperature = keyword.at;
+  deck.notes.add("*TEMPERATURE: loads have no effect on the modes of the structure at rest");
 }
 
 void read_initial_conditions(Deck& deck, const Keyword& keyword) {
   const std::string type = upper_key(deck.lines.need(keyword, "TYPE"));
-  for (const std::string_view harmless : {"TEMPERATURE", "VELOCITY", "FIELD", "TOTALTEMPERATURE"}) {
+  if (type == "TEMPERATURE") return read_initial_temperatures(deck, keyword);
+  for (const std::string_view harmless : {"VELOCITY", "FIELD", "TOTALTEMPERATURE"}) {
     if (type == harmless) {
       deck.notes.add(fmt::format("{}, TYPE={} has no effect on the modes", keyword.at, type));
       return;

@@ -147,7 +147,12 @@ void read_mpc(Bulk& bulk, const Card& card) {
       const std::vector<int> component = bulk.cards.components(card, i + 1);
       if (component.size() != 1) bulk.fail(card.field(i + 1), "MPC: a term has one component");
       const double coefficient = bulk.cards.real(card, i + 2, "coefficient");
-      if (coefficient != 0)
+      if (coefficient == 0 && line.terms.empty())
+        bulk.fail(card.field(i + 2), "MPC: the first coefficient must not be zero: its freedom follows the others");
+      if (coefficient == 0)
+        bulk.notes.add(fmt::format("{}: a term of the MPC has the coefficient zero and is left out",
+                                   bulk.cards.text().line_location(card.at)));
+      else
         line.terms.push_back({bulk.cards.id(card, i, "grid"), component[0], coefficient, card.field(i)});
     }
   }

@@ -6,13 +6,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <functional>
-#include <memory>
-#include <system_error>
 
 namespace flexboom {
 namespace {
@@ -36,33 +32,11 @@ std::optional<Number> whole_token(std::string_view token) {
   return value;
 }
 
-std::string read_stream(std::FILE* file) {
-  std::string bytes;
-  if (std::fseek(file, 0, SEEK_END) == 0) {
-    if (const long size = std::ftell(file); size > 0) bytes.resize(static_cast<size_t>(size));
-    std::rewind(file);
-    bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file));
-  }
-  std::array<char, 4096> more{};  // of a pipe, or of a file that grew
-  while (const size_t count = std::fread(more.data(), 1, more.size(), file)) bytes.append(more.data(), count);
-  return bytes;
-}
-
 }  // namespace
 
-std::string file_bytes(const std::filesystem::path& path) {
-  const auto fault = [&path](int code) {
-    return InputError(fmt::format("cannot read {}: {}", path.string(), std::generic_category().message(code)));
-  };
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) throw fault(EISDIR);
-  const auto close = [](std::FILE* file) { std::fclose(file); };
-  errno = 0;
-  const std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(path.c_str(), "rb"), close);
-  if (!file) throw fault(errno);
-  std::string bytes = read_stream(file.get());
-  if (std::ferror(file.get())) throw fault(errno != 0 ? errno : EIO);
-  return bytes;
+std::string_view without_byte_order_mark(std::string_view text) {
+  constexpr std::string_view mark = "\xEF\xBB\xBF";
+  return text.starts_with(mark) ? text.substr(mark.size()) : text;
 }
 
 std::string_view trimmed(std::string_view text) {

@@ -1,14 +1,13 @@
 #pragma once
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
 
 namespace flexboom {
 
-/// The bytes of a file. @throws InputError naming the file and the reason (missing, a folder, no permission, ...).
-std::string file_bytes(const std::filesystem::path&);
+/// Text without the byte order mark of UTF-8 that some programs begin it with.
+std::string_view without_byte_order_mark(std::string_view);
 
 /// Text without blanks, tabs and carriage returns at its ends.
 std::string_view trimmed(std::string_view);
@@ -26,8 +25,8 @@ std::optional<double> to_real(std::string_view, bool fortran = false);
 /// fault costs nothing to keep: its line and column are found when it is reported.
 class TextReader {
  public:
-  /// The text must outlive the reader; `file` is its name in messages.
-  TextReader(std::string_view text, std::string file) : text_(text), file_(std::move(file)) {}
+  /// The text must outlive the reader; `file` is its name in messages. A byte order mark is passed over.
+  TextReader(std::string_view text, std::string file) : text_(without_byte_order_mark(text)), file_(std::move(file)) {}
 
   std::string_view text() const { return text_; }
   const std::string& file() const { return file_; }

@@ -19,6 +19,10 @@ namespace {
 
 // zlib cannot make more of a byte (its technical details: 1032 to 1).
 constexpr size_t highest_expansion = 1032;
+// What all arrays may become for each byte of the file, and of any file. Meshes are packed to a tenth, a constant array
+// to a thousandth.
+constexpr size_t most_expansion = 64;
+constexpr size_t always_expanded = size_t{64} << 20;
 constexpr double largest_whole = 9007199254740992;  // 2^53
 
 struct NumberType {
@@ -93,7 +97,8 @@ std::optional<std::string> inflated(std::string_view packed, size_t room) {
 
 }  // namespace
 
-VtuArrays::VtuArrays(std::string_view text, const std::string& file) : text_(text), reader_(text, file) {
+VtuArrays::VtuArrays(std::string_view text, const std::string& file)
+    : text_(without_byte_order_mark(text)), reader_(text, file) {
   parse();
   const pugi::xml_node root = document_.child("VTKFile");
   if (!root) reader_.fail(text_, "a .vtu file has the root element VTKFile, this one not");
@@ -255,6 +260,10 @@ std::string VtuArrays::compressed_bytes(pugi::xml_node array, ByteStream& stream
   const size_t last_size = blocks > 0 ? header_number(array, stream) : 0;
   if (blocks > expected || last_size > block_size)
     fail(array, fmt::format("{} blocks of {} bytes cannot make the {} bytes expected", blocks, block_size, expected));
+  unpacked_ += expected;
+  if (unpacked_ > always_expanded + most_expansion * text_.size())
+    fail(array, fmt::format("the arrays up to here unpack to {} bytes, more than {} times the file", unpacked_,
+                            most_expansion));
   std::vector<size_t> sizes;
   for (size_t i = 0; i < blocks; ++i) sizes.push_back(header_number(array, stream));
   std::string bytes;

@@ -67,6 +67,7 @@ class VtuArrays {
   bool swapped_ = false;
   bool wide_header_ = false;
   bool compressed_ = false;
+  mutable size_t unpacked_ = 0;  // bytes of all compressed arrays that were read
   bool before_2_1_ = true;
 };
 

@@ -1,3 +1,4 @@
+#include "fem/files.hpp"
 #include "fem/text_reader.hpp"
 #include "reduction/export_42.hpp"
 #include "reduction/export_integrals.hpp"

@@ -1,4 +1,5 @@
 #include "fem/check.hpp"
+#include "fem/files.hpp"
 #include "fem/text_reader.hpp"
 #include "reduction/export_mbdyn.hpp"
 

@@ -235,6 +235,7 @@ void write_exudyn_dictionary(const std::filesystem::path& path, const ExudynDict
 }
 
 ExudynDictionary read_exudyn_dictionary(const std::filesystem::path& path) {
+  require_regular_file(path);
   const SilentHdf5 silent;
   std::error_code error;
   require(std::filesystem::is_regular_file(path, error), "cannot read " + path.string() + ": there is no such file");

@@ -3,6 +3,7 @@
 #include "fem/check.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -28,6 +29,34 @@ std::string text_of(const fs::path& path) {
   std::ostringstream text;
   text << in.rdbuf();
   return text.str();
+}
+
+std::string message_of(const fs::path& path, size_t most = largest_file) {
+  try {
+    file_bytes(path, most);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(FileBytes, ReadsFilesAlone) {
+  const Folder folder;
+  const fs::path pipe = folder.path / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);  // without a writer: to open it would wait for one
+  for (const fs::path& path : {pipe, fs::path("/dev/zero"), fs::path("/dev/null")})
+    EXPECT_EQ(message_of(path), "cannot read " + path.string() + ": it is a device, pipe or socket, not a file");
+  EXPECT_EQ(message_of(folder.path), "cannot read " + folder.path.string() + ": Is a directory");
+  EXPECT_GT(file_bytes("/proc/self/status").size(), 0U);  // a file that says that it is empty
+}
+
+TEST(FileBytes, HasALimit) {
+  const Folder folder;
+  write_file(folder.path / "a.txt", std::string(3 << 20, 'x'));
+  EXPECT_EQ(file_bytes(folder.path / "a.txt").size(), size_t{3} << 20);
+  EXPECT_NE(message_of(folder.path / "a.txt", 2 << 20).find("larger than 2 MB"), std::string::npos);
+  fs::resize_file(folder.path / "a.txt", largest_file + 1);  // sparse: nothing is read
+  EXPECT_NE(message_of(folder.path / "a.txt").find("larger than 4096 MB"), std::string::npos);
 }
 
 TEST(WriteFile, ReplacesTheWholeText) {

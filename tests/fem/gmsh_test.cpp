@@ -1,7 +1,7 @@
 #include "fem/gmsh.hpp"
 
+#include "fem/files.hpp"
 #include "fem/node_orders.hpp"
-#include "fem/text_reader.hpp"
 #include "mesh_file_testing.hpp"
 
 #include <cstring>

@@ -5,6 +5,8 @@
 #include "fem/write_abaqus.hpp"
 #include "mesh_file_testing.hpp"
 
+#include <sys/stat.h>
+
 #include <cstdlib>
 #include <fstream>
 
@@ -210,6 +212,46 @@ TEST(WriteAbaqus, WhatADeckCannotHoldIsAnInputError) {
             "material steel_part is missing; give E, nu and rho (--material E,nu,rho)");
   EXPECT_EQ(fault(tet, [](Mesh& m) { m.node_sets["ROOT"] = {3}; }),
             "two sets would be called ROOT in a deck, which has one case");
+}
+
+// Editors of Windows begin a file with the byte order mark of UTF-8.
+TEST(MeshFile, AByteOrderMarkIsPassedOver) {
+  const Folder folder;
+  const MeshFile original = read_mesh(test_mesh("hex_2_v41.msh"));
+  Mesh mesh = original.mesh;
+  for (SolidProperty& property : mesh.solid_properties) property.material = {70e9, 0.3, 2700};
+  write_mesh(folder.path / "plain.vtu", mesh);
+  write_file(folder.path / "plain.inp", "*NODE\n1\n2, 1\n3, 0, 1\n4, 0, 0, 1\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n");
+  write_file(folder.path / "plain.bdf",
+             "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\nCTETRA,1,1,1,2,3,4\n"
+             "PSOLID,1,1\nMAT1,1,7.+10,,.3,2700.\n");
+  std::filesystem::copy(test_mesh("hex_2_v41.msh"), folder.path / "plain.msh");
+  std::filesystem::copy(test_mesh("hex_2_v41_binary.msh"), folder.path / "plain.MSH");
+  for (const std::string extension : {".inp", ".bdf", ".msh", ".MSH", ".vtu"}) {
+    const std::filesystem::path plain = folder.path / ("plain" + extension),
+                                marked = folder.path / ("marked" + extension);
+    write_file(marked, "\xEF\xBB\xBF" + file_bytes(plain));
+    EXPECT_EQ(read_mesh(marked).mesh.nodes, read_mesh(plain).mesh.nodes) << extension;
+  }
+}
+
+// A pipe without a writer would be waited for, a device never ends.
+TEST(MeshFile, OnlyFilesAreRead) {
+  const Folder folder;
+  for (const std::string extension : {".inp", ".bdf", ".msh", ".vtu", ".geo", ".step"}) {
+    const std::filesystem::path pipe = folder.path / ("pipe" + extension), zero = folder.path / ("zero" + extension);
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    std::filesystem::create_symlink("/dev/zero", zero);
+    for (const std::filesystem::path& path : {pipe, zero})
+      EXPECT_EQ(input_error([&] { read_mesh(path); }),
+                "cannot read " + path.string() + ": it is a device, pipe or socket, not a file");
+  }
+}
+
+TEST(MeshFile, ADialectIsOfDecks) {
+  ReadOptions options;
+  options.dialect = Dialect::abaqus;
+  EXPECT_NE(input_error([&] { read_mesh("any.msh", options); }).find("is of decks"), std::string::npos);
 }
 
 }  // namespace

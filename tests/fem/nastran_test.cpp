@@ -1,7 +1,7 @@
 #include "fem/read_nastran.hpp"
 
 #include "deck_testing.hpp"
-#include "fem/text_reader.hpp"
+#include "fem/files.hpp"
 
 #include <fmt/format.h>
 
@@ -46,6 +46,39 @@ TEST(Nastran, FixedLargeAndFreeFieldsSayTheSame) {
     EXPECT_EQ(mesh.solid_properties[0].material.E, 2.1e11);
     EXPECT_EQ(mesh.solid_properties[0].material.rho, 6000);
   }
+}
+
+// Three bars in a plane, along (1, 1, 0) and with their y axis in the plane or normal to it.
+std::string frame(const std::string& direction, const std::string& systems, const std::string& supports) {
+  std::string text = systems;
+  for (int i = 0; i < 4; ++i) text += fmt::format("GRID,{},,{}.,{}.,0.\n", i + 1, i, i);
+  for (int i = 0; i < 3; ++i) text += fmt::format("CBAR,{},1,{},{},{}\n", i + 1, i + 1, i + 2, direction);
+  return text + "PBAR,1,1,1.-4,1.-8,2.-8,3.-8\n,0.,0.,0.,0.,0.,0.,0.,0.\n,.85,.85\nMAT1,1,7.+10,,.3,2700.\n" + supports;
+}
+
+TEST(Nastran, FieldsThatAreHeldEverywhereAreHeldInsideElements) {
+  const auto free_of = [](const std::string& text) {
+    const Mesh mesh = read(text).mesh;
+    return unknowns(mesh, assemble(mesh).dofs, {}).count;
+  };
+  constexpr int bubbles = 4, bending = 9;  // of order 4
+  const std::string root = "SPC1,1,126,1\n", plane = "SPC1,1,345,1,THRU,4\n";
+  for (const std::string direction : {"0.,0.,1.", "-1.,1.,0."}) {
+    for (const std::string& text : {frame(direction, "GRDSET,,,,,,,345\n", root), frame(direction, "", root + plane)})
+      EXPECT_EQ(free_of(text), 9 + 3 * (bubbles + bending)) << direction;
+    // Torsion alone, about an axis that is none of the mesh, is not held by components of the mesh.
+    EXPECT_EQ(free_of(frame(direction, "", "SPC1,1,123456,1\nSPC1,1,4,2,THRU,4\n")), 15 + 3 * 2 * (bubbles + bending));
+    EXPECT_EQ(free_of(frame(direction, "", "SPC1,1,45,1,THRU,4\n")), 16 + 3 * (bubbles + 2 * bending));
+    EXPECT_EQ(free_of(frame(direction, "", root)), 21 + 3 * 2 * (bubbles + bending));
+  }
+  // All nodes held: what is left are vibrations between supports.
+  EXPECT_EQ(free_of(frame("0.,0.,1.", "", "SPC1,1,123456,1,THRU,4\n")), 3 * 2 * (bubbles + bending));
+}
+
+TEST(Nastran, ZeroCoefficientsOfMpcsAreSaid) {
+  const std::string first = input_error([] { read(small + "MPC,1,1,1,0.,2,1,1.\n"); });
+  EXPECT_NE(first.find("the first coefficient must not be zero"), std::string::npos) << first;
+  EXPECT_TRUE(has_note(read(small + "MPC,1,1,1,1.,2,1,0.\n"), "coefficient zero"));
 }
 
 TEST(Nastran, CaseControlSelectsSupportsAndModes) {

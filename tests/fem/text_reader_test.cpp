@@ -1,4 +1,5 @@
 #include "fem/text_reader.hpp"
+#include "fem/files.hpp"
 
 #include "fem/label_index.hpp"
 #include "fem_testing.hpp"

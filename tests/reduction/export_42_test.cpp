@@ -1,5 +1,5 @@
 #include "reduction/export_42.hpp"
-#include "fem/text_reader.hpp"
+#include "fem/files.hpp"
 #include "tests/reduction/export_testing.hpp"
 
 #include <gtest/gtest.h>

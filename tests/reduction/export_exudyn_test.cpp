@@ -1,6 +1,6 @@
 #include "reduction/export_exudyn.hpp"
 
-#include "fem/text_reader.hpp"
+#include "fem/files.hpp"
 #include "reduction/exudyn_dictionary.hpp"
 #include "tests/reduction/skew_body.hpp"
 
