@@ -1,5 +1,6 @@
 #include "apps/commands.hpp"
 #include "apps/compare.hpp"
+#include "apps/toml_reader.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
@@ -7,16 +8,15 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 
 namespace flexboom {
 
 using nlohmann::ordered_json;
 
 bool is_body_file(const std::string& path) {
-  std::ifstream in(path);
-  std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  return text.find("\"flexboom-body-1\"") != std::string::npos;
+  std::error_code ignored;  // of the name of a built-in scene
+  return std::filesystem::is_regular_file(path, ignored) &&
+         toml_reader::read_text(path).find("\"flexboom-body-1\"") != std::string::npos;
 }
 
 namespace {

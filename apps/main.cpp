@@ -14,6 +14,7 @@
 #include <cstdio>
 #include <cstring>
 #include <functional>
+#include <map>
 #include <sstream>
 #include <system_error>
 
@@ -179,6 +180,11 @@ struct CommandLine {
     c->add_option("--element", options.element, "Of a solid body: hex, hex8, hex20, ...");
     c->add_option("--order", options.order, "Polynomial order of beams and of hex");
     c->add_option("--accuracy", options.accuracy, "Relative error wanted in the frequencies of a solid body");
+    const std::map<std::string, Dialect> dialects = {{"calculix", Dialect::calculix}, {"abaqus", Dialect::abaqus}};
+    c->add_option("--dialect", options.read.dialect,
+                  "Program that a deck (.inp) is for, where the deck does not tell: calculix or abaqus")
+        ->transform(CLI::CheckedTransformer(dialects));
+    c->add_flag("--trust", options.read.trust, "Let a .geo file run commands and write files");
   }
 
   void add_compare() {

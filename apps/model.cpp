@@ -13,6 +13,7 @@ namespace {
 
 Model body_model(const std::filesystem::path& path, const ModelOptions& options) {
   BodyScene body = read_body(path);
+  require(!options.read.dialect, fmt::format("--dialect: is for decks (.inp); {} is a body file", path.string()));
   if (options.structure) body.structure = *options.structure;
   const bool solid = body.structure == "solid";
   require(solid || body.structure == "beam" || body.structure == "eq14" || body.structure == "rigid",
@@ -45,7 +46,7 @@ Model file_model(const std::filesystem::path& path, const ModelOptions& options)
                                     {options.accuracy.has_value(), "--accuracy"}}) {
     require(!given, fmt::format("{}: is for body files (.toml); {} has its elements", name, path.string()));
   }
-  MeshFile file = read_mesh(path);
+  MeshFile file = read_mesh(path, options.read);
   Model model;
   model.name = path.stem().string();
   model.mesh = std::move(file.mesh);

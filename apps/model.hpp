@@ -1,6 +1,7 @@
 #pragma once
 
 #include "fem/constraints.hpp"
+#include "fem/mesh_file.hpp"
 #include "reduction/reduced_body.hpp"
 
 #include <filesystem>
@@ -19,6 +20,7 @@ struct ModelOptions {
   std::optional<std::string> element;    // of a solid made by flexboom
   std::optional<int> order;
   std::optional<double> accuracy;
+  ReadOptions read;  // of a mesh file
 };
 
 /// What `modes`, `mesh` and `bench` work on: a body file made into a mesh, or a mesh file.

@@ -2,6 +2,7 @@
 
 #include "apps/version.hpp"
 #include "fem/check.hpp"
+#include "fem/mesh_sets.hpp"
 #include "fem/inertia.hpp"
 #include "fem/stopwatch.hpp"
 #include "fem/text_reader.hpp"
@@ -182,6 +183,23 @@ std::string options_text(const ReduceArguments& a, const EigenOptions& options) 
   return text;
 }
 
+/// The options with the names of node sets as the mesh spells them.
+ReduceArguments with_names_of(const Mesh& mesh, ReduceArguments a) {
+  const auto spell = [&mesh](std::string& text, size_t end) {  // the name ends there, or with the text
+    text = node_set_name(mesh, text.substr(0, end)) + (end < text.size() ? text.substr(end) : "");
+  };
+  for (std::string& text : a.interfaces) spell(text, text.find(':'));
+  for (std::string& text : a.attachments) spell(text, text.rfind('.'));
+  for (std::string& text : a.loads_at) spell(text, std::string::npos);
+  if (!a.reference.empty()) spell(a.reference, std::string::npos);
+  if (a.select && a.select->starts_with("output:")) {
+    std::string place = a.select->substr(std::string("output:").size());
+    spell(place, place.rfind('.', place.find(',')));
+    a.select = "output:" + place;
+  }
+  return a;
+}
+
 /// Node sets that the body keeps as markers and where loads act for geometric stiffness: all that move, or those asked
 /// for.
 std::vector<std::string> loaded_markers(const ReducedBody& body, const Mesh& mesh,
@@ -208,8 +226,9 @@ DampingRule parse_damping(const std::string& text) {
       "--damping: '{}' is not understood; there are none, modal:ZETA, loss-factor:ETA, rayleigh:ALPHA,BETA", text));
 }
 
-ReducedBody make_reduced_body(Model& model, const ReduceArguments& a, int threads, ReductionSeconds& seconds) {
-  check_options(a);
+ReducedBody make_reduced_body(Model& model, const ReduceArguments& arguments, int threads, ReductionSeconds& seconds) {
+  check_options(arguments);
+  const ReduceArguments a = with_names_of(model.mesh, arguments);
   for (const std::string& name : a.loads_at) node_set(model.mesh, name);  // before the long work
   Stopwatch clock;
   const DampingRule damping = a.damping ? parse_damping(*a.damping) : model.damping;

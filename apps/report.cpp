@@ -3,6 +3,7 @@
 #include "apps/plot.hpp"
 #include "apps/scene.hpp"
 #include "fem/check.hpp"
+#include "fem/files.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -10,7 +11,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <numbers>
 #include <sstream>
 
@@ -22,14 +22,6 @@ using json = nlohmann::ordered_json;  // tables in the order of the file
 namespace {
 
 constexpr double degrees = 180 / std::numbers::pi;
-
-std::string text_of(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  require(static_cast<bool>(in), fmt::format("cannot read {}", path.string()));
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
 
 /// Columns of a trajectory.csv by name.
 struct Table {
@@ -51,7 +43,7 @@ std::vector<std::string> split(const std::string& line) {
 }
 
 Table read_table(const fs::path& path) {
-  std::istringstream in(text_of(path));
+  std::istringstream in(file_bytes(path));
   std::string line;
   Table table;
   std::getline(in, line);
@@ -82,7 +74,7 @@ struct Folder {
 Folder read_folder(const fs::path& folder) {
   Folder f{read_scene(folder / "scene.toml"), read_table(folder / "trajectory.csv"), {}};
   try {
-    f.summary = json::parse(text_of(folder / "summary.json"));
+    f.summary = json::parse(file_bytes(folder / "summary.json"));
   } catch (const json::exception& e) {
     throw InputError(fmt::format("{}: {}", (folder / "summary.json").string(), e.what()));
   }

@@ -2,13 +2,9 @@
 
 #include "apps/toml_reader.hpp"
 #include "fem/check.hpp"
+#include "fem/files.hpp"
 
 #include <fmt/format.h>
-
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
 
 namespace flexboom::toml_reader {
 namespace {
@@ -19,18 +15,7 @@ bool is_blank(const std::string& text) { return text.find_first_not_of(" \t\r\n"
 
 }  // namespace
 
-std::string read_text(const std::string& path) {
-  std::error_code error;
-  require(!std::filesystem::is_directory(path, error), path + ": is a folder; give a file");
-  std::ifstream file(path, std::ios::binary);
-  require(file.good(), fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
-  std::string text(max_file_size + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  require(!file.bad(), path + ": cannot be read");
-  text.resize(static_cast<size_t>(file.gcount()));
-  require(text.size() <= max_file_size, path + ": is larger than 16 MB; that is none of our files");
-  return text;
-}
+std::string read_text(const std::string& path) { return file_bytes(path, max_file_size); }
 
 Value parse_format(const std::string& text, const std::string& file, std::string_view format) {
   require(!is_blank(text),

@@ -18,6 +18,7 @@ namespace {
 using Kind = Value::Kind;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr size_t max_tables = 2000;  // of one array; names are compared in pairs
 constexpr size_t max_line =
     4096;  // bounds the depth of a dotted key, which the parser and its destructors recurse over
 
@@ -385,6 +386,10 @@ std::vector<TableReader> TableReader::tables(std::string_view key) {
   if (!array) return result;
   if (array->kind != Kind::array) {
     fault(key, fmt::format("{}; it must be an array of tables, each under [[{}]]", found(*array), key));
+    return result;
+  }
+  if (array->items.size() > max_tables) {
+    fault(key, fmt::format("has {} entries; {} are allowed", array->items.size(), max_tables));
     return result;
   }
   for (size_t i = 0; i < array->items.size(); ++i) {
