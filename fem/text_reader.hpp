@@ -1,5 +1,7 @@
 #pragma once
 
+#include "fem/files.hpp"
+
 #include <optional>
 #include <string>
 #include <string_view>
