@@ -107,9 +107,9 @@ Assembled assembled(Model& model, const ReduceArguments& a, int threads) {
 }
 
 /// Static solutions over the unknowns of a held body, by the factor of its modes where they were solved with this K.
-StaticSolver static_solver(const Model& model, const Assembly& assembly, const Clamp& held, const ModalBasis& basis) {
+StaticSolver statics_of(const Model& model, const Assembly& assembly, const Clamp& held, const ModalBasis& basis) {
   if (basis.factor) return StaticSolver(basis.factor, basis.K);
-  return StaticSolver(unknowns(model.mesh, assembly.dofs, held).reduced(assembly.K), {});
+  return static_solver(model.mesh, assembly, unknowns(model.mesh, assembly.dofs, held));
 }
 
 ModalBasis basis_of(const Model& model, const Assembled& m, const ReduceArguments& a, int threads) {
@@ -259,7 +259,7 @@ ReducedBody make_reduced_body(Model& model, const ReduceArguments& arguments, in
   }
   const bool flies = body.frame == "clamped" || body.frame == "mean-axis";
   std::optional<StaticSolver> statics;  // one factorisation for the stiffening and the certificate
-  if (body.frame == "clamped" && body.n() > 0) statics = static_solver(model, m.assembly, held, basis);
+  if (body.frame == "clamped" && body.n() > 0) statics = statics_of(model, m.assembly, held, basis);
   const StaticSolver* held_statics = statics ? &*statics : nullptr;
   if (a.stiffening && flies && body.n() > 0) {
     body.Kg = geometric_stiffness(model.mesh, m.assembly, held, basis.Phi,

@@ -3,13 +3,18 @@
 #include "fem/at.hpp"
 #include "fem/check.hpp"
 #include "fem/held_fields.hpp"
+#include "fem/idle_freedoms.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <Eigen/QR>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <set>
 
 namespace flexboom {
 namespace {
@@ -189,24 +194,43 @@ class Elimination {
   std::vector<int> list_;
 };
 
-std::vector<char> held_freedoms(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp) {
-  std::vector<char> held = dofs.absent;
-  const auto hold = [&](int node, const Components& components) {
-    for (int k = 0; k < dofs.freedoms_of(node); ++k) {
-      if (components[at(k)]) held[at(dofs.of_node(node, k))] = 1;
-    }
-  };
-  for (const int node : clamp.nodes) {
-    require(node >= 0 && node < mesh.nodes.cols(), fmt::format("clamp: node {} is missing", node));
-    hold(node, all_components);
+/// Unknowns among `rows` (of followers) that move nothing that strains or has mass, or nothing that others do not move:
+/// they have no motion of their own. `open`: freedoms that may be left out.
+std::vector<int> without_motion(const std::vector<std::vector<std::pair<int, double>>>& rows,
+                                const std::vector<char>& idle, const std::vector<char>& open) {
+  std::vector<std::vector<std::pair<int, double>>> moved;
+  for (size_t follower = 0; follower < rows.size(); ++follower) {
+    if (idle[follower]) continue;
+    std::vector<std::pair<int, double>> row;
+    std::ranges::copy_if(rows[follower], std::back_inserter(row),
+                         [&open](const auto& term) { return open[at(term.first)]; });
+    if (!row.empty()) moved.push_back(std::move(row));
   }
-  if (clamp.with_supports) {
-    for (const Support& support : mesh.supports) hold(support.node, support.components);
-    if (!mesh.supports.empty()) {
-      for (const int dof : internal_freedoms_of_held_fields(mesh, dofs, held)) held[at(dof)] = 1;
-    }
+  std::vector<char> moves(rows.size(), 0);
+  for (IdleGroup& group : idle_groups(moved, static_cast<int>(rows.size()))) {
+    group.A.colwise().normalize();
+    Eigen::ColPivHouseholderQR<MatrixXd> qr(group.A);
+    qr.setThreshold(idle_rank);
+    for (Index i = 0; i < qr.rank(); ++i)
+      moves[at(group.freedoms[static_cast<size_t>(qr.colsPermutation().indices()(i))])] = 1;
   }
-  return held;
+  std::vector<int> result;
+  for (size_t dof = 0; dof < open.size(); ++dof) {
+    if (open[dof] && !moves[dof]) result.push_back(static_cast<int>(dof));
+  }
+  return result;
+}
+
+/// Why no freedom is left.
+std::string nothing_left(const Mesh& mesh, const DofMap& dofs) {
+  if (std::ranges::find(dofs.absent, 0) != dofs.absent.end()) return "modes: every freedom is clamped";
+  std::vector<std::string> materials;
+  for (const SolidProperty& property : mesh.solid_properties) materials.push_back(fmt::format("\"{}\"", property.name));
+  if (!mesh.beam_properties.empty()) materials.emplace_back("of the beams");
+  return fmt::format(
+      "modes: nothing has mass, and without mass there are no frequencies; the density is missing or zero: "
+      "material {}; give it in the file, or with --material E,nu,rho",
+      fmt::join(materials, ", "));
 }
 
 SparseMatrix make_sparse(Index rows, Index cols, const Triplets& triplets) {
@@ -270,6 +294,26 @@ std::pair<SparseMatrix, SparseMatrix> follower_parts(const SparseMatrix& A, cons
 
 }  // namespace
 
+std::vector<char> held_freedoms(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp) {
+  std::vector<char> held = dofs.absent;
+  const auto hold = [&](int node, const Components& components) {
+    for (int k = 0; k < dofs.freedoms_of(node); ++k) {
+      if (components[at(k)]) held[at(dofs.of_node(node, k))] = 1;
+    }
+  };
+  for (const int node : clamp.nodes) {
+    require(node >= 0 && node < mesh.nodes.cols(), fmt::format("clamp: node {} is missing", node));
+    hold(node, all_components);
+  }
+  if (clamp.with_supports) {
+    for (const Support& support : mesh.supports) hold(support.node, support.components);
+    if (!mesh.supports.empty()) {
+      for (const int dof : internal_freedoms_of_held_fields(mesh, dofs, held)) held[at(dof)] = 1;
+    }
+  }
+  return held;
+}
+
 std::vector<ConstraintRow> constraint_rows(const Mesh& mesh, const DofMap& dofs) {
   std::vector<ConstraintRow> rows;
   for (const RigidConnection& c : mesh.rigid_connections) add_rigid(rows, mesh, dofs, c);
@@ -285,6 +329,40 @@ std::vector<ConstraintRow> constraint_rows(const Mesh& mesh, const DofMap& dofs)
       row.preferred = row.terms.front().first;
   }
   return rows;
+}
+
+Mesh without_supports(Mesh mesh) {
+  std::vector<char> in_body(at(static_cast<int>(mesh.nodes.cols())), 0);
+  const auto add = [&in_body](int node) { in_body[at(node)] = 1; };
+  for (const Element& element : mesh.elements) std::ranges::for_each(element.nodes, add);
+  for (const NodalBody& body : mesh.bodies) add(body.node);
+  for (const RigidConnection& c : mesh.rigid_connections) {
+    add(c.reference);
+    std::ranges::for_each(c.nodes, add);
+  }
+  for (const DistributingConnection& c : mesh.distributing_connections) {
+    add(c.reference);
+    std::ranges::for_each(c.nodes, add);
+  }
+  std::set<std::pair<int, int>> ground;  // node, component
+  for (const Support& support : mesh.supports) {
+    for (int k = 0; k < 6; ++k) {
+      if (support.components[at(k)] && !in_body[at(support.node)]) ground.emplace(support.node, k);
+    }
+  }
+  for (const LinearEquation& equation : mesh.equations) {
+    const LinearEquation::Term& first = equation.terms.front();
+    if (equation.terms.size() == 1 && !in_body[at(first.node)]) ground.emplace(first.node, first.component);
+  }
+  std::erase_if(mesh.equations, [&ground](const LinearEquation& equation) {
+    std::set<int> nodes;
+    for (const LinearEquation::Term& term : equation.terms) {
+      if (term.coefficient != 0 && !ground.contains({term.node, term.component})) nodes.insert(term.node);
+    }
+    return nodes.size() <= 1;
+  });
+  mesh.supports.clear();
+  return mesh;
 }
 
 SparseMatrix Unknowns::reduced(const SparseMatrix& A) const {
@@ -325,39 +403,22 @@ std::vector<int> Unknowns::free_dofs() const {
   return free;
 }
 
-int rigid_freedoms(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp) {
-  const std::vector<char> held = held_freedoms(mesh, dofs, clamp);
-  // Lengths are scaled to the body, so that rotations count like translations.
-  const Vector3d centre = mesh.nodes.rowwise().mean();
-  const double size = std::max(1e-300, (mesh.nodes.colwise() - centre).colwise().norm().maxCoeff());
-  using Gram = Eigen::Matrix<double, 6, 6>;
-  Gram of_held = Gram::Zero(), of_all = Gram::Zero();
-  for (int node = 0; node < mesh.nodes.cols(); ++node) {
-    const Vector3d r = (mesh.nodes.col(node) - centre) / size;
-    for (int k = 0; k < dofs.freedoms_of(node); ++k) {
-      const int dof = dofs.of_node(node, k);
-      if (dofs.absent[at(dof)]) continue;
-      Eigen::Vector<double, 6> motion = Eigen::Vector<double, 6>::Zero();
-      motion(k) = 1;
-      if (k < 3) motion.tail<3>() = r.cross(Vector3d::Unit(k));  // (theta x r)_k = theta . (r x e_k)
-      of_all += motion * motion.transpose();
-      if (held[at(dof)]) of_held += motion * motion.transpose();
-    }
-  }
-  // Motions that move nothing (the spin of a line mass) are no freedoms.
-  const auto null_space = [](const Gram& gram) {
-    const Eigen::SelfAdjointEigenSolver<Gram> solver(gram, Eigen::EigenvaluesOnly);
-    return static_cast<int>((solver.eigenvalues().array() <= 1e-12 * std::max(1.0, gram.trace())).count());
-  };
-  return null_space(of_held) - null_space(of_all);
-}
-
 Unknowns unknowns(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp, const std::vector<int>& independent) {
-  const std::vector<char> held = held_freedoms(mesh, dofs, clamp);
+  if (!clamp.with_supports) return unknowns(without_supports(mesh), dofs, {clamp.nodes}, independent);
+  std::vector<char> held = held_freedoms(mesh, dofs, clamp);
   std::vector<char> keep(held.size(), 0);
   for (const int dof : independent) keep[at(dof)] = 1;
   Elimination elimination(dofs.count, held, std::move(keep));
   for (const ConstraintRow& row : constraint_rows(mesh, dofs)) elimination.add(row);
+
+  const std::vector<std::vector<std::pair<int, double>>> rows = elimination.resolved();
+  const std::vector<char> idle = idle_freedoms(mesh, dofs);
+  std::vector<char> open = idle;
+  for (int dof = 0; dof < dofs.count; ++dof) {
+    if (elimination.is_pivot(dof) || held[at(dof)]) open[at(dof)] = 0;
+  }
+  for (const int dof : independent) open[at(dof)] = 0;
+  for (const int dof : without_motion(rows, idle, open)) held[at(dof)] = 1;
 
   Unknowns result;
   result.of_freedom.assign(at(dofs.count), -1);
@@ -368,13 +429,12 @@ Unknowns unknowns(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp, cons
       result.of_freedom[at(dof)] = result.count++;
     }
   }
-  require(result.count > 0, "modes: every freedom is clamped");
+  if (result.count == 0) throw InputError(nothing_left(mesh, dofs));
   if (result.follower.empty()) return result;
-  const auto rows = elimination.resolved();
   Triplets triplets;
   for (size_t i = 0; i < result.follower.size(); ++i) {
     for (const auto& [dof, coefficient] : rows[at(result.follower[i])]) {
-      triplets.emplace_back(static_cast<int>(i), result.of_freedom[at(dof)], coefficient);
+      if (!held[at(dof)]) triplets.emplace_back(static_cast<int>(i), result.of_freedom[at(dof)], coefficient);
     }
   }
   result.follower_rows = make_sparse(std::ssize(result.follower), result.count, triplets);

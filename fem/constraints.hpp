@@ -18,6 +18,10 @@ struct ConstraintRow {
 /// @throws InputError naming a connection whose nodes cannot carry the rotation asked for (they lie on a line).
 std::vector<ConstraintRow> constraint_rows(const Mesh&, const DofMap&);
 
+/// The mesh without what ties it to the ground: its supports, and equations that hold one node alone. Freedoms that are
+/// held of a node that only equations use are ground, too.
+Mesh without_supports(Mesh);
+
 /// What holds the mesh: the supports that it carries, and nodes that are clamped beside them (all freedoms).
 struct Clamp {
   Clamp() = default;
@@ -25,8 +29,12 @@ struct Clamp {
       : nodes(std::move(clamped_nodes)), with_supports(supported) {}
 
   std::vector<int> nodes;
-  bool with_supports = true;  // false: the mesh's own supports are left out
+  bool with_supports = true;  // false: the mesh's own supports are left out, see without_supports
 };
+
+/// A flag per freedom: absent, clamped or supported.
+/// @throws InputError for a clamped node that is missing.
+std::vector<char> held_freedoms(const Mesh&, const DofMap&, const Clamp&);
 
 /// The unknowns that clamps, supports, connections and equations leave: u = T x.
 struct Unknowns {
@@ -49,11 +57,13 @@ struct Unknowns {
 };
 
 /// Eliminates the constraints by Gaussian elimination, the preferred freedom of each as its pivot where possible;
-/// redundant ones drop out. Freedoms that are `independent` never follow others.
+/// redundant ones drop out. Freedoms that are `independent` never follow others. Those of reference nodes that move
+/// nothing of their own are no unknowns.
 /// @throws InputError as constraint_rows, when nothing is left, and when independent freedoms are tied to each other.
 Unknowns unknowns(const Mesh&, const DofMap&, const Clamp&, const std::vector<int>& independent = {});
 
-/// How many of the six rigid motions of the whole mesh a clamp and the supports leave, 0 to 6.
+/// How many of the six rigid motions of the whole mesh a clamp, the supports and the connections and equations leave, 0
+/// to 6. Freedoms without stiffness move as the constraints want.
 int rigid_freedoms(const Mesh&, const DofMap&, const Clamp&);
 
 }  // namespace flexboom

@@ -135,6 +135,10 @@ struct SparseFactor::Impl {
   // D_jj is the first entry of column j of a simplicial L D L^T.
   double pivot(Eigen::Index j) const { return static_cast<const double*>(L->x)[static_cast<const int*>(L->p)[j]]; }
 
+  int unknown_at(Eigen::Index pivot) const {
+    return static_cast<int>(std::ranges::find(place, static_cast<int>(pivot)) - place.begin());
+  }
+
   void check_pivots() {
     if (kind == FactorKind::definite) {
       require_definite();
@@ -145,7 +149,7 @@ struct SparseFactor::Impl {
     }
     for (Eigen::Index j = 0; j < size; ++j) {
       if (std::isfinite(pivot(j)) && pivot(j) != 0) continue;
-      throw NumericalError(fmt::format("sparse factorisation: pivot {} of {} is {}", j, size, pivot(j)));
+      throw SingularMatrix(fmt::format("sparse factorisation: pivot {} of {} is {}", j, size, pivot(j)), unknown_at(j));
     }
   }
 
@@ -217,8 +221,8 @@ struct SparseFactor::Impl {
 
   void require_definite() const {
     if (static_cast<Eigen::Index>(L->minor) < size)
-      throw NumericalError(
-          fmt::format("sparse factorisation: not positive definite at pivot {} of {}", L->minor, size));
+      throw SingularMatrix(fmt::format("sparse factorisation: not positive definite at pivot {} of {}", L->minor, size),
+                           unknown_at(static_cast<Eigen::Index>(L->minor)));
   }
 };
 
@@ -262,7 +266,7 @@ void SparseFactor::factorise(const SparseMatrix& A) {
     cholmod_factorize(&a, impl_->L, &impl_->common);
   }
   return_freed_memory();
-  if (impl_->common.status == CHOLMOD_NOT_POSDEF && impl_->kind == FactorKind::definite) impl_->require_definite();
+  if (impl_->common.status == CHOLMOD_NOT_POSDEF) impl_->require_definite();
   check_status(impl_->common, "sparse factorisation");
   impl_->check_pivots();
   impl_->factorised = true;

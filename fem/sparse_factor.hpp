@@ -1,5 +1,6 @@
 #pragma once
 
+#include "fem/check.hpp"
 #include "fem/sparse.hpp"
 
 #include <memory>
@@ -21,6 +22,13 @@ struct FactorSummary {
   double factor_seconds = 0;   // the last factorisation
 };
 
+/// A pivot is zero or not positive where it must be.
+class SingularMatrix : public NumericalError {
+ public:
+  SingularMatrix(const std::string& text, int row) : NumericalError(text), unknown(row) {}
+  int unknown;  // row of the matrix
+};
+
 /// Factor of a sparse symmetric matrix through CHOLMOD (its only door but for orderings). The symbolic analysis is made
 /// once and reused by every refactor with the same pattern.
 class SparseFactor {
@@ -31,7 +39,7 @@ class SparseFactor {
   SparseFactor(SparseFactor&&) noexcept;
   SparseFactor& operator=(SparseFactor&&) noexcept;
 
-  /// Factorises A (same pattern). @throws NumericalError when a pivot is zero or, of a definite one, not positive.
+  /// Factorises A (same pattern). @throws SingularMatrix when a pivot is zero or, of a definite one, not positive.
   void factorise(const SparseMatrix& A);
 
   /// X = A^-1 B for any number of columns; of a definite one 16 cost what 2 alone do. X may be B itself. Work space is

@@ -6,7 +6,7 @@
 #include "reduction/mean_axis.hpp"
 #include "reduction/static_shapes.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Cholesky>
 
 #include <cmath>
 #include <numbers>
@@ -27,33 +27,15 @@ std::vector<int> nodes_of(const ModalBasis& basis, const Mesh& mesh, const std::
   return node_set(mesh, marker);
 }
 
-/// As many unknowns as there are rigid motions, that hold the body without straining it: the pivots of a QR
-/// factorisation of the motions of all unknowns, lengths scaled to the body.
-std::vector<int> determinate_support(const Mesh& mesh, const DofMap& dofs, const Unknowns& left, int rigid) {
-  const double size = (mesh.nodes.rowwise().maxCoeff() - mesh.nodes.rowwise().minCoeff()).norm();
-  MatrixXd T = rigid_motions(mesh, dofs);
-  const Eigen::Vector3d centre = mesh.nodes.rowwise().mean();
-  T.col(3) += centre.z() * T.col(1) - centre.y() * T.col(2);  // about the centre
-  T.col(4) += centre.x() * T.col(2) - centre.z() * T.col(0);
-  T.col(5) += centre.y() * T.col(0) - centre.x() * T.col(1);
-  T.rightCols(3) /= size;
-  const std::vector<int> free = left.free_dofs();
-  const Eigen::ColPivHouseholderQR<MatrixXd> qr(T(free, Eigen::all).transpose());
-  std::vector<int> support;
-  for (int i = 0; i < rigid; ++i) support.push_back(qr.colsPermutation().indices()(i));
-  return support;
-}
-
 /// Static shapes of loads; of a free body those of the loads and the inertia forces that balance them.
 MatrixXd static_shapes(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const MatrixXd& loads) {
   const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
-  const SparseMatrix K = left.reduced(assembly.K);
   const int rigid = rigid_freedoms(mesh, assembly.dofs, clamp);
-  if (rigid == 0) return left.expanded(StaticSolver(K, {}).loaded(left.reduced_loads(loads)));
+  if (rigid == 0) return left.expanded(static_solver(mesh, assembly, left).loaded(left.reduced_loads(loads)));
   const MatrixXd T = rigid_modes(mesh, assembly);
   require(T.cols() == rigid, "attachment modes: the body is held in some rigid motions only; hold it or free it");
   const MatrixXd balanced = loads - symmetric_product(assembly.M, T) * (T.transpose() * loads);
-  const StaticSolver solver(K, determinate_support(mesh, assembly.dofs, left, rigid));
+  const StaticSolver solver = static_solver(mesh, assembly, left, determinate_support(mesh, assembly.dofs, left));
   return without_rigid_part(mesh, assembly, left.expanded(solver.loaded(left.reduced_loads(balanced))));
 }
 

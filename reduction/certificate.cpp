@@ -55,8 +55,10 @@ void add_bessel(std::vector<BodyCheck>& checks, const ReducedBody& body) {
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale.asDiagonal() * left * scale.asDiagonal(),
                                                       Eigen::EigenvaluesOnly);
   const double lowest = eigen.eigenvalues()(0);
-  checks.push_back({"inertia left to the body by all coordinates, lowest share", lowest, 0, std::max(0.0, -lowest),
-                    lowest >= -1e-9});
+  BodyCheck left_over =
+      vanishing("inertia left to the body by all coordinates, lowest share", std::max(0.0, -lowest), 1e-9);
+  left_over.value = lowest;
+  checks.push_back(std::move(left_over));
 }
 
 /// Largest entry off the diagonal of a matrix, relative to the diagonal.
@@ -152,7 +154,7 @@ std::vector<BodyCheck> certificate(const ReducedBody& body, const Mesh& mesh, co
   if (body.n() > 0 && body.frame == "clamped") {
     const Unknowns left = unknowns(mesh, assembly.dofs, clamp);
     std::optional<StaticSolver> own;
-    if (statics == nullptr) statics = &own.emplace(left.reduced(assembly.K), std::vector<int>{});
+    if (statics == nullptr) statics = &own.emplace(static_solver(mesh, assembly, left));
     add_static_response(checks, body, mesh, assembly.dofs, left, *statics, exact_at, threads);
   }
   for (const std::vector<BodyCheck>& more :

@@ -30,8 +30,7 @@ Mesh supported(Mesh mesh, const std::vector<InterfaceNode>& interfaces) {
 
 Plan plan_of(const Mesh& mesh, const DofMap& dofs, const std::vector<InterfaceNode>& interfaces,
              const std::string& reference, const Clamp& clamp) {
-  Plan plan{mesh, {}, {clamp.nodes}, {}, {}, {}};
-  if (!clamp.with_supports) plan.held.supports.clear();
+  Plan plan{clamp.with_supports ? mesh : without_supports(mesh), {}, {clamp.nodes}, {}, {}, {}};
   std::vector<InterfaceNode> references;
   for (const InterfaceNode& i : interfaces) (i.name == reference ? references : plan.kept).push_back(i);
   require(reference.empty() || references.size() == 1,
@@ -117,7 +116,7 @@ ModalBasis craig_bampton(const Mesh& mesh, const Assembly& assembly, std::vector
   const Plan plan = plan_of(mesh, assembly.dofs, interfaces, options.reference, clamp);
   const Unknowns left = unknowns(plan.held, assembly.dofs, plan.clamp, plan.all_freedoms);
   const std::vector<int> b = boundary(plan, left);
-  const StaticSolver solver(left.reduced(assembly.K), b);
+  const StaticSolver solver = static_solver(plan.held, assembly, left, b);
   const MatrixXd Psi_c = left.expanded(solver.displaced(MatrixXd::Identity(std::ssize(b), std::ssize(b))));
 
   ModalBasis normal;

@@ -84,7 +84,7 @@ EigenPairs arpack_modes(const EigenProblem& problem, const SparseFactor& shifted
   const int count = request.count;
   const auto n = static_cast<int>(problem.K.rows());
   const double tolerance = request.tolerance > 0 || n < many_unknowns ? request.tolerance : tolerance_of_many;
-  Lanczos a(n, count, static_cast<int>((problem.M.diagonal().array() > 0).count()));
+  Lanczos a(n, count, finite_eigenvalues(problem));
   EigenPairs pairs;
   pairs.summary.solves = iterate(a, problem, shifted, tolerance);
   pairs.summary.iterations = a.iparam[2];

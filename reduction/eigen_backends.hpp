@@ -32,6 +32,10 @@ constexpr double infinite_nu = 1e-14;
 /// when the shift is so near an eigenvalue that the others drown in round-off.
 [[noreturn]] void throw_too_few_eigenvalues(const EigenProblem&, double largest_nu, Eigen::Index found, int wanted);
 
+/// How many finite eigenvalues there can be: the rank of M, of large problems (where it hardly matters) the freedoms
+/// with mass. Elements with fewer mass points than nodes have fewer of them than freedoms.
+int finite_eigenvalues(const EigenProblem&);
+
 /// From this many unknowns on, backends are content with fewer digits unless they are told: solves cost time then, and
 /// an eigenvalue is as good as the square of its residual. Smaller problems keep all digits of their vectors.
 constexpr int many_unknowns = 2000;

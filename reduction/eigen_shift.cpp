@@ -115,7 +115,7 @@ int zero_modes(const EigenProblem& p, const EigenPairs& pairs) {
 double free_shift(const EigenProblem& p, ShiftedFactor& shifted, int num_modes) {
   constexpr double few_digits = 1e-3;
   const auto n = static_cast<int>(p.K.rows());
-  const auto with_mass = static_cast<int>((p.M.diagonal().array() > 0).count());
+  const int with_mass = finite_eigenvalues(p);
   double crude = -1e-9 * stiffness_scale(p);
   for (int count = std::min(with_mass, 7), attempt = 0;; ++attempt) {
     try {

@@ -7,6 +7,7 @@
 #include "reduction/eigen_verify.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Cholesky>
 
 #include <algorithm>
 #include <array>
@@ -23,7 +24,7 @@ const EigenBackend& backend_named(const std::string& name) {
   std::string known;
   for (const EigenBackend& row : eigen_backends()) {
     if (row.name == name) return row;
-    known += "\"" + std::string(row.name) + "\", ";
+    known += fmt::format("\"{}\", ", row.name);
   }
   throw InputError("eigen-solver \"" + name + "\" is unknown; there are " + known + "\"auto\"");
 }
@@ -36,8 +37,6 @@ void check_entries(const SparseMatrix& A, const char* name) {
     }
   }
 }
-
-int freedoms_with_mass(const EigenProblem& p) { return static_cast<int>((p.M.diagonal().array() > 0).count()); }
 
 void check_input(const EigenProblem& p, const EigenOptions& options) {
   const Eigen::Index n = p.K.rows();
@@ -57,7 +56,7 @@ void check_input(const EigenProblem& p, const EigenOptions& options) {
   const double least = p.M.diagonal().minCoeff(&lightest);
   require(least >= 0,
           fmt::format("eigenproblem: entry ({0}, {0}) of M is {1}; a mass is not negative", lightest, least));
-  const int with_mass = freedoms_with_mass(p);
+  const int with_mass = finite_eigenvalues(p);
   require(options.num_modes <= with_mass,
           fmt::format("modes: {} asked, but only {} of {} freedoms carry mass: there are no more finite frequencies",
                       options.num_modes, with_mass, n));
@@ -65,14 +64,14 @@ void check_input(const EigenProblem& p, const EigenOptions& options) {
 
 /// Lanczos leaves at least one vector out: a backend that cannot return them all is replaced by one that can.
 const EigenBackend& able(const EigenBackend& wanted, const EigenProblem& p, int count) {
-  if (count < freedoms_with_mass(p) || wanted.name == "dense") return wanted;
+  if (count < finite_eigenvalues(p) || wanted.name == "dense") return wanted;
   return backend_named(p.K.rows() <= dense_limit ? "dense" : "block");
 }
 
 /// Solves and verifies, with twice as many modes as long as no gap is seen above those wanted.
 EigenPairs verified_modes(const EigenProblem& p, ShiftedFactor& shifted, const EigenBackend& wanted, double sigma,
                           int count, const EigenOptions& options) {
-  const int most = freedoms_with_mass(p);
+  const int most = finite_eigenvalues(p);
   shifted.move_to(sigma);
   for (count = std::min(most, count);; count = std::min(most, 2 * count)) {
     const EigenBackend& backend = able(wanted, p, count);
@@ -108,6 +107,17 @@ std::span<const EigenBackend> eigen_backends() {
       {"dense", dense_modes},
   }};
   return rows;
+}
+
+int finite_eigenvalues(const EigenProblem& p) {
+  constexpr Eigen::Index small = 200;  // unknowns whose factor costs nothing
+  const auto with_mass = static_cast<int>((p.M.diagonal().array() > 0).count());
+  if (p.M.rows() > small) return with_mass;
+  const Eigen::VectorXd scale = p.M.diagonal().unaryExpr([](double m) { return m > 0 ? 1 / std::sqrt(m) : 0; });
+  const Eigen::MatrixXd M = scale.asDiagonal() * Eigen::MatrixXd(p.M) * scale.asDiagonal();
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(M);  // pivots by size; reads the lower triangle
+  const int rank = static_cast<int>((ldlt.vectorD().array() > 1e-12).count());
+  return std::min(rank, with_mass);
 }
 
 void throw_too_few_eigenvalues(const EigenProblem& p, double largest_nu, Eigen::Index found, int wanted) {

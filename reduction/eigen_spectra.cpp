@@ -64,7 +64,7 @@ int iterate(Solver& solver, double tolerance) {
 EigenPairs spectra_modes(const EigenProblem& problem, const SparseFactor& shifted, const EigenRequest& request) {
   const int count = request.count;
   const auto n = static_cast<int>(problem.K.rows());
-  const auto with_mass = static_cast<int>((problem.M.diagonal().array() > 0).count());
+  const int with_mass = finite_eigenvalues(problem);
   ShiftedInverse inverse(shifted, n);
   MassProduct mass(problem.M);
   Solver solver(inverse, mass, count, lanczos_vectors(count, with_mass), request.sigma);

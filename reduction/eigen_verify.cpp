@@ -17,6 +17,7 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <vector>
 
 namespace flexboom {
 namespace {
@@ -68,24 +69,39 @@ class Search {
 
   /// The inverse times load().
   void take(MatrixXd X) {
+    const VectorXd before = X.colwise().norm();
     add_product(X, -1, Transposed::no, Phi_, transposed_product(M_Phi_, X));
+    std::vector<Index> outside;  // what is left of the others is round-off
+    for (Index i = 0; i < X.cols(); ++i) {
+      if (X.col(i).norm() > 1e-12 * before(i)) outside.push_back(i);
+    }
+    X = X(Eigen::all, outside).eval();
     if (++solves_ == 1) {
       X.colwise().normalize();
       load_ = symmetric_product(p_.M, X);
+      exhausted_ = outside.empty();
       return;
     }
     // With A = K - sigma M and Y the inverse times M X: Y^T A Y = Y^T M X, so 1 / (lambda - sigma) are the eigenvalues
-    // of Y^T M Y against it.
-    const MatrixXd mass = quadratic_form(p_.M, X);
-    const MatrixXd energy = X.transpose() * load_;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> ritz(mass, (energy + energy.transpose()) / 2,
-                                                                  Eigen::EigenvaluesOnly);
-    if (ritz.info() == Eigen::Success) lowest_ = 1 / ritz.eigenvalues().maxCoeff();
+    // of Y^T M Y against it; where few freedoms are left, of the part of full rank.
+    const MatrixXd energy = X.transpose() * load_(Eigen::all, outside);
     load_.resize(load_.rows(), 0);
+    if (outside.empty()) return;
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen((energy + energy.transpose()) / 2);
+    const VectorXd& w = eigen.eigenvalues();
+    const Index rank = (w.array() > 1e-10 * w(w.size() - 1)).count();
+    const MatrixXd Y = X * eigen.eigenvectors().rightCols(rank) * w.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
+    if (rank > 0)
+      lowest_ = 1 / Eigen::SelfAdjointEigenSolver<MatrixXd>(quadratic_form(p_.M, Y), Eigen::EigenvaluesOnly)
+                        .eigenvalues()
+                        .maxCoeff();
   }
 
   /// Lowest lambda - sigma seen.
   double lowest() const { return lowest_; }
+
+  /// Whether random vectors have no part outside the modes found: those are all.
+  bool exhausted() const { return exhausted_; }
 
  private:
   const EigenProblem& p_;
@@ -93,6 +109,7 @@ class Search {
   const MatrixXd& M_Phi_;
   MatrixXd load_;
   int solves_ = 0;
+  bool exhausted_ = false;
   double lowest_ = std::numeric_limits<double>::infinity();
 };
 
@@ -159,6 +176,10 @@ void judge(const Search& search, EigenSummary& s, double last, Index unknowns) {
   if (search.lowest() < (1 - 1e-6) * (last - s.sigma))
     throw NumericalError(fmt::format("a search from random vectors found a mode below {:.6g} Hz that is missing",
                                      hertz(s.sigma + search.lowest())));
+  if (search.exhausted()) {
+    s.proof = "no mode is missed: random vectors have no part outside those found";
+    return;
+  }
   s.proof = fmt::format(
       "completeness not proven: {} unknowns; ask for the Sturm count. A search from {} random vectors found nothing "
       "below {:.6g} Hz",

@@ -28,16 +28,6 @@ MatrixXd rigid_accelerations(const MatrixXd& F, const MatrixXd& T, const MatrixX
   return (T.transpose() * MT).completeOrthogonalDecomposition().solve(T.transpose() * F);
 }
 
-/// Six unknowns that hold a free body without straining it: the rows of T that are the most independent.
-std::vector<int> pins(const MatrixXd& T) {
-  const double length = std::sqrt(T.rightCols<3>().squaredNorm() / T.leftCols<3>().squaredNorm());
-  MatrixXd scaled = T;
-  scaled.rightCols<3>() /= length;
-  const Eigen::ColPivHouseholderQR<MatrixXd> qr(scaled.transpose());
-  const auto& order = qr.colsPermutation().indices();
-  return {order.data(), order.data() + qr.rank()};
-}
-
 /// Whether the body is free. @throws InputError when it can move in some ways and not in all.
 bool is_free(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp) {
   const int rigid = rigid_freedoms(mesh, dofs, clamp);
@@ -62,17 +52,16 @@ void relieve(Statics& statics, const Mesh& mesh, const Assembly& assembly, const
   const MatrixXd x = rigid_accelerations(statics.F, T, MT);
   statics.F -= MT * x;
   statics.fields += inertial_fields().rightCols<6>() * x;  // of -a and -alpha x u0
-  const MatrixXd T_left = T(left.free_dofs(), Eigen::all);
-  const StaticSolver pinned(left.reduced(assembly.K), pins(T_left));
+  const StaticSolver pinned = static_solver(mesh, assembly, left, determinate_support(mesh, assembly.dofs, left));
   statics.U0 = left.expanded(pinned.loaded(left.reduced_loads(statics.F)));
 }
 
 /// Displacements of a held body. The digits that the factor of a slender body loses are those of its lowest modes:
 /// where the stiffness of the shapes is known, they are restored there instead of by a second solve.
-MatrixXd displacements(const Assembly& assembly, const Unknowns& left, const MatrixXd& F, const MatrixXd& Phi,
-                       const GeometricOptions& options) {
+MatrixXd displacements(const Mesh& mesh, const Assembly& assembly, const Unknowns& left, const MatrixXd& F,
+                       const MatrixXd& Phi, const GeometricOptions& options) {
   const MatrixXd f = left.reduced_loads(F);
-  if (options.statics == nullptr) return left.expanded(StaticSolver(left.reduced(assembly.K), {}).loaded(f));
+  if (options.statics == nullptr) return left.expanded(static_solver(mesh, assembly, left).loaded(f));
   if (options.Ke == nullptr || Phi.cols() == 0) return left.expanded(options.statics->loaded(f));
   const auto [x, left_over] = options.statics->loaded_once(f);
   MatrixXd U0 = left.expanded(x), residual = MatrixXd::Zero(F.rows(), F.cols());
@@ -95,7 +84,7 @@ Statics statics(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, 
   if (is_free(mesh, assembly.dofs, clamp))
     relieve(result, mesh, assembly, left);
   else
-    result.U0 = displacements(assembly, left, result.F, Phi, options);
+    result.U0 = displacements(mesh, assembly, left, result.F, Phi, options);
   return result;
 }
 

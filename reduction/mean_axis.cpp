@@ -42,10 +42,13 @@ ModalBasis mean_axis_modes(const Mesh& mesh, const Assembly& assembly, EigenOpti
   const int rigid = rigid_freedoms(mesh, assembly.dofs, nothing);
   const int wanted = options.num_modes;
   options.num_modes += rigid;
+  const auto motions = static_cast<int>(rigid_modes(mesh, assembly).cols());
+  require(rigid == motions, "mean-axis: equations leave the body " + std::to_string(rigid) + " of its " +
+                                std::to_string(motions) + " rigid motions; a body under mean axes is not held");
   const ModalBasis all = clamped_modes(mesh, assembly, nothing, options, threads);
-  require(all.summary.rigid_modes <= rigid, "mean-axis: the body has " + std::to_string(all.summary.rigid_modes) +
-                                                " motions that store no energy, " + std::to_string(rigid) +
-                                                " expected; it falls apart or is a mechanism: join its parts");
+  require(all.rigid_freedoms <= rigid, "mean-axis: the body has " + std::to_string(all.rigid_freedoms) +
+                                           " motions that store no energy, " + std::to_string(rigid) +
+                                           " expected; it falls apart or is a mechanism: join its parts");
   std::vector<int> elastic(static_cast<size_t>(wanted));
   std::iota(elastic.begin(), elastic.end(), rigid);
   ModalBasis basis = selected(all, elastic);

@@ -1,6 +1,7 @@
 #include "reduction/modal_basis.hpp"
 
 #include "fem/check.hpp"
+#include "fem/idle_freedoms.hpp"
 #include "reduction/mode_alignment.hpp"
 #include "reduction/reduced_matrices.hpp"
 #include "reduction/smooth_shapes.hpp"
@@ -8,6 +9,7 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -36,16 +38,31 @@ VectorXd modal_masses(const SparseMatrix& M, const MatrixXd& Phi) {
 /// What the modes of a mesh need of its assembly beside the eigenproblem.
 struct ModalModel {
   ModalModel(const Mesh& m, const Assembly& assembly, const Clamp& clamp)
-      : mesh(m), dofs(assembly.dofs), convention(m, assembly, clamp), weights(assembly.M.diagonal()) {}
+      : mesh(m),
+        dofs(assembly.dofs),
+        convention(m, assembly, clamp),
+        weights(assembly.M.diagonal()),
+        springs(assembly.K.diagonal()) {}
 
   const Mesh& mesh;
   const DofMap& dofs;
   ModeConvention convention;
   VectorXd weights;  // diagonal of M
+  VectorXd springs;  // diagonal of K
 };
 
+/// How many shapes at the front store no strain energy: less than the round-off of what their displacements would store
+/// if every freedom were alone. That measure knows neither the size nor the slenderness of the body.
+int strainless(const ModalModel& model, const MatrixXd& Phi, const VectorXd& strain) {
+  const VectorXd alone = Phi.cwiseAbs2().transpose() * model.springs / 2;
+  int count = 0;
+  while (count < strain.size() && strain(count) <= std::numeric_limits<double>::epsilon() * alone(count)) ++count;
+  return count;
+}
+
 /// The first `wanted` modes over all freedoms of the mesh, aligned, of the right sign and size. Rigid motions, if any,
-/// come first. `masses_of`: phi^T M phi of each column.
+/// come first: `rigid` of the whole body, and those that its parts have beside. `masses_of`: phi^T M phi of each
+/// column.
 template <class Masses>
 ModalBasis finished(const ModalModel& model, MatrixXd Phi, const Masses& masses_of, const EigenSummary& summary,
                     int wanted, int rigid, int threads) {
@@ -53,16 +70,16 @@ ModalBasis finished(const ModalModel& model, MatrixXd Phi, const Masses& masses_
   ModalBasis basis;
   basis.Phi = Phi.leftCols(wanted);
   basis.summary = summary;
-  basis.rigid_freedoms = rigid;
-  basis.frame = rigid == 0 ? "clamped" : "free";
   basis.mass = model.convention.mass();
-  basis.kind = mode_kinds(model.mesh, model.dofs, model.weights, basis.Phi);
-  std::fill_n(basis.kind.begin(), std::min(rigid, wanted), ModeKind::rigid);
-  model.convention.scale(basis.Phi, basis.kind);
   // Rayleigh quotients summed over element strains: phi^T K phi of a stiff, slender body cancels to noise in its last
   // digits.
   const VectorXd strain = strain_energies(model.mesh, model.dofs, basis.Phi, threads);
   basis.omega = (2 * strain).cwiseQuotient(masses_of(basis.Phi)).cwiseMax(0).cwiseSqrt();
+  basis.rigid_freedoms = std::max(rigid, strainless(model, basis.Phi, strain));
+  basis.frame = basis.rigid_freedoms == 0 ? "clamped" : "free";
+  basis.kind = mode_kinds(model.mesh, model.dofs, model.weights, basis.Phi);
+  std::fill_n(basis.kind.begin(), std::min(basis.rigid_freedoms, wanted), ModeKind::rigid);
+  model.convention.scale(basis.Phi, basis.kind);
   keep_modes(basis.summary, wanted, [](int i) { return i; });
   basis.coordinates = mode_table(basis);
   return basis;
@@ -87,7 +104,15 @@ struct Reduced {
   explicit Reduced(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp)
       : unknowns(flexboom::unknowns(mesh, assembly.dofs, clamp)),
         K(unknowns.reduced(assembly.K)),
-        M(unknowns.reduced(assembly.M)) {}
+        M(unknowns.reduced(assembly.M)) {
+    const auto idle = ((K.diagonal().array() == 0) && (M.diagonal().array() == 0)).eval();
+    for (Index i = 0; i < idle.size(); ++i) {
+      if (!idle(i)) continue;
+      const int dof = unknowns.free_dofs()[static_cast<size_t>(i)];
+      throw InputError("modes: " + freedom_name(mesh, assembly.dofs, dof) +
+                       " has neither stiffness nor mass; hold it, or join it to the body");
+    }
+  }
 
   Unknowns unknowns;
   SparseMatrix K, M;

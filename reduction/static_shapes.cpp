@@ -1,5 +1,10 @@
 #include "reduction/static_shapes.hpp"
 
+#include "fem/idle_freedoms.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/QR>
+
 #include <utility>
 
 namespace flexboom {
@@ -45,13 +50,38 @@ std::vector<int> others(Index count, const std::vector<int>& held) {
   return left;
 }
 
-std::shared_ptr<const SparseFactor> factorised(const SparseMatrix& K) {
+/// `unknown`: of each row of K.
+std::shared_ptr<const SparseFactor> factorised(const SparseMatrix& K, const std::vector<int>& unknown) {
   auto factor = std::make_shared<SparseFactor>(K, FactorKind::definite);
-  factor->factorise(K);
+  try {
+    factor->factorise(K);
+  } catch (const SingularMatrix& e) {
+    throw SingularMatrix(e.what(), unknown[static_cast<size_t>(e.unknown)]);
+  }
   return factor;
 }
 
 }  // namespace
+
+std::vector<int> determinate_support(const Mesh& mesh, const DofMap& dofs, const Unknowns& left) {
+  const double size = (mesh.nodes.rowwise().maxCoeff() - mesh.nodes.rowwise().minCoeff()).norm();
+  MatrixXd T = rigid_motions(mesh, dofs);
+  const Eigen::Vector3d centre = mesh.nodes.rowwise().mean();
+  T.col(3) += centre.z() * T.col(1) - centre.y() * T.col(2);  // about the centre
+  T.col(4) += centre.x() * T.col(2) - centre.z() * T.col(0);
+  T.col(5) += centre.y() * T.col(0) - centre.x() * T.col(1);
+  T.rightCols(3) /= size;
+  const std::vector<char> strained = strained_freedoms(mesh, dofs);
+  std::vector<int> freedoms = left.free_dofs();
+  std::erase_if(freedoms, [&strained](int dof) { return !strained[static_cast<size_t>(dof)]; });
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(T(freedoms, Eigen::all).transpose());
+  std::vector<int> support;
+  for (Index i = 0; i < qr.rank(); ++i) {
+    const int dof = freedoms[static_cast<size_t>(qr.colsPermutation().indices()(i))];
+    support.push_back(left.of_freedom[static_cast<size_t>(dof)]);
+  }
+  return support;
+}
 
 StaticSolver::StaticSolver(const SparseMatrix& K, const std::vector<int>& held)
     : count_(K.cols()), held_(held), left_(others(K.cols(), held)) {
@@ -59,7 +89,7 @@ StaticSolver::StaticSolver(const SparseMatrix& K, const std::vector<int>& held)
   K_held_.swap(to_held);
   const auto own = std::make_shared<SparseMatrix>();
   own->swap(among);
-  factor_ = factorised(*own);
+  factor_ = factorised(*own, left_);
   K_ = own;
 }
 
@@ -91,6 +121,17 @@ MatrixXd StaticSolver::loaded(const MatrixXd& f) const {
   MatrixXd x = MatrixXd::Zero(count_, f.cols());
   x(left_, Eigen::all) = solve(f(left_, Eigen::all));
   return x;
+}
+
+StaticSolver static_solver(const Mesh& mesh, const Assembly& assembly, const Unknowns& left,
+                           const std::vector<int>& held) {
+  try {
+    return {left.reduced(assembly.K), held};
+  } catch (const SingularMatrix& e) {
+    const int dof = left.free_dofs()[static_cast<size_t>(e.unknown)];
+    throw NumericalError(fmt::format("{}: nothing resists {}; hold it, or join what it belongs to", e.what(),
+                                     freedom_name(mesh, assembly.dofs, dof)));
+  }
 }
 
 std::pair<MatrixXd, MatrixXd> StaticSolver::loaded_once(const MatrixXd& f) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "fem/constraints.hpp"
 #include "fem/sparse_factor.hpp"
 
 #include <Eigen/Core>
@@ -10,10 +11,14 @@
 
 namespace flexboom {
 
+/// Unknowns that hold a free body without straining it, as many as it has rigid motions: the pivots of a QR
+/// factorisation of the motions of what elements resist, lengths scaled to the body.
+std::vector<int> determinate_support(const Mesh&, const DofMap&, const Unknowns&);
+
 /// Static solutions of K x = f with some of the unknowns held: one factorisation of the others.
 class StaticSolver {
  public:
-  /// K: lower triangle. @throws NumericalError when the held unknowns leave a motion without stiffness.
+  /// K: lower triangle. @throws SingularMatrix when the held unknowns leave a motion without stiffness.
   StaticSolver(const SparseMatrix& K, const std::vector<int>& held);
 
   /// Nothing held, by the factor of K that the caller has (ModalBasis::factor and K): nothing is copied.
@@ -38,5 +43,9 @@ class StaticSolver {
   SparseMatrix K_held_;                    // left x held
   std::shared_ptr<const SparseFactor> factor_;
 };
+
+/// Static solutions of a mesh over the unknowns that its constraints leave, with some of them held.
+/// @throws NumericalError naming a node and the direction in which it can move without stiffness.
+StaticSolver static_solver(const Mesh&, const Assembly&, const Unknowns&, const std::vector<int>& held = {});
 
 }  // namespace flexboom

@@ -74,6 +74,166 @@ TEST(RigidFreedoms, CountWhatTheClampLeaves) {
   EXPECT_EQ(rigid_freedoms(mesh, dofs, {}), 1) << "two ball joints leave the turn about their line";
 }
 
+/// u along a direction at a node.
+LinearEquation along(int node, const Vector3d& direction) {
+  LinearEquation equation;
+  for (int k = 0; k < 3; ++k) equation.terms.push_back({node, k, direction(k)});
+  return equation;
+}
+
+/// Three, two and one direction of skew axes at nodes that no line joins: no rigid motion is left.
+std::vector<LinearEquation> determinate_rollers() {
+  const Matrix3d axes = Eigen::AngleAxisd(0.7, Vector3d(1, 2, -1).normalized()).toRotationMatrix();
+  return {along(5, axes.col(0)), along(5, axes.col(1)), along(5, axes.col(2)),
+          along(7, axes.col(0)), along(7, axes.col(1)), along(0, axes.col(2))};
+}
+
+TEST(RigidFreedoms, RollersInTurnedAxesHold) {
+  Mesh mesh = frame();
+  mesh.rigid_connections = {{4, cloud_nodes, all_components}};
+  mesh.equations = determinate_rollers();
+  const DofMap dofs = assemble(mesh).dofs;
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, {}), 0);
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, Clamp({}, false)), 6);
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, Clamp({0}, false)), 0);
+  for (size_t i = 0; i < mesh.equations.size(); ++i) {
+    Mesh fewer = mesh;
+    fewer.equations.erase(fewer.equations.begin() + static_cast<long>(i));
+    EXPECT_EQ(rigid_freedoms(fewer, dofs, {}), 1) << i;
+  }
+  mesh.equations.push_back(along(6, {0.1, -0.4, 0.3}));
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, {}), 0) << "held more than once";
+}
+
+TEST(RigidFreedoms, TurnsOfANodeHeldByEquationsHold) {
+  Mesh mesh = frame();
+  mesh.rigid_connections = {{4, cloud_nodes, all_components}};
+  mesh.supports = {{0, {true, true, true, false, false, false}}};
+  mesh.equations = {{{{2, 3, 0.6}, {2, 4, 0.8}}}, {{{2, 4, 0.6}, {2, 3, -0.8}}}};
+  const DofMap dofs = assemble(mesh).dofs;
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, {}), 1);
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, Clamp({}, false)), 6);
+}
+
+/// A reference node far away that only equations use: the x of two nodes and the y of a third follow it.
+Mesh tied_to_reference(Mesh mesh, int& reference) {
+  reference = static_cast<int>(mesh.nodes.cols());
+  mesh.nodes.conservativeResize(3, reference + 1);
+  mesh.nodes.col(reference) = Vector3d(100, -30, 7);
+  mesh.equations = {
+      {{{5, 0, 1}, {reference, 0, -1}}}, {{{7, 0, 1}, {reference, 0, -1}}}, {{{6, 1, 2}, {reference, 1, -1}}}};
+  return mesh;
+}
+
+TEST(RigidFreedoms, ReferenceNodesOfEquationsMoveAsTheyMust) {
+  int reference = 0;
+  Mesh mesh = frame();
+  mesh.rigid_connections = {{4, cloud_nodes, all_components}};
+  mesh = tied_to_reference(mesh, reference);
+  const DofMap dofs = assemble(mesh).dofs;
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, {}), 5) << "nodes 5 and 7 keep abreast";
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, Clamp({}, false)), 5) << "a tie is no support";
+  mesh.supports = {{reference, {true, true, false, false, false, false}}};
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, {}), 3);
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, Clamp({}, false)), 6) << "what follows a held reference node is held";
+  mesh.supports.clear();
+  mesh.equations.push_back({{{reference, 0, 2}}});
+  mesh.equations.push_back({{{reference, 1, 1}}});
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, {}), 3);
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, Clamp({}, false)), 6);
+}
+
+TEST(RigidFreedoms, HeldFreedomsThatNothingFollowsDoNotHold) {
+  Mesh mesh = frame();
+  const auto reference = static_cast<int>(mesh.nodes.cols());
+  mesh.nodes.conservativeResize(3, reference + 1);
+  mesh.nodes.col(reference) = Vector3d(0.6, 0.2, 0.1);
+  mesh.rigid_connections = {{4, {5}, all_components}};
+  mesh.distributing_connections = {{reference, cloud_nodes, {1, 1, 1, 1}, {true, true, true, false, false, false}}};
+  mesh.supports = {{reference, {false, false, false, true, true, true}}};
+  const DofMap dofs = assemble(mesh).dofs;
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, {}), 6);
+  mesh.distributing_connections[0].components = all_components;
+  EXPECT_EQ(rigid_freedoms(mesh, dofs, {}), 3);
+}
+
+TEST(Supports, LeftOutWithTheEquationsThatHoldOneNode) {
+  Mesh mesh = frame();
+  mesh.supports = {{1, all_components}};
+  mesh.equations = determinate_rollers();
+  mesh.equations.push_back({{{5, 0, 1}, {1, 0, -1}}});  // node 1 is of the body: a tie
+  mesh.equations.push_back({{{3, 2, 4}}});
+  const Mesh free = without_supports(mesh);
+  EXPECT_TRUE(free.supports.empty());
+  ASSERT_EQ(free.equations.size(), 1U);
+  EXPECT_EQ(free.equations[0].terms[1].node, 1);
+  const DofMap dofs = assemble(mesh).dofs;
+  EXPECT_EQ(unknowns(mesh, dofs, Clamp({}, false)).count, dofs.count - 1);
+}
+
+/// Smallest pivot of K + M over the unknowns, each scaled to one.
+double definiteness(const Assembly& a, const Unknowns& u) {
+  MatrixXd A = full(u.reduced(a.K)) + full(u.reduced(a.M));
+  const VectorXd scale = A.diagonal().cwiseSqrt().cwiseInverse();
+  return Eigen::SelfAdjointEigenSolver<MatrixXd>(scale.asDiagonal() * A * scale.asDiagonal()).eigenvalues()(0);
+}
+
+TEST(Unknowns, ReferenceNodesHaveThoseThatConstraintsDetermine) {
+  const auto with_reference = [](const auto& connect) {
+    Mesh mesh = frame();
+    const auto reference = static_cast<int>(mesh.nodes.cols());
+    mesh.nodes.conservativeResize(3, reference + 1);
+    mesh.nodes.col(reference) = Vector3d(0.5, 0.3, 0);
+    mesh.rigid_connections = {{4, {5}, all_components}};
+    connect(mesh, reference);
+    return mesh;
+  };
+  const Components x = {true, false, false, false, false, false}, moves = {true, true, true, false, false, false};
+  const std::vector<std::pair<Mesh, int>> cases = {
+      // mesh, unknowns more than without the reference node
+      {with_reference([](Mesh& m, int r) {
+         m.equations = {{{{6, 0, 1}, {r, 0, -1}}}};
+       }),
+       0},
+      {with_reference([](Mesh& m, int r) {
+         m.equations = {{{{6, 0, 1}, {r, 0, -1}, {r, 1, 3}}}};
+       }),
+       0},
+      {with_reference([](Mesh& m, int r) {
+         m.equations = {{{{6, 0, 1}, {r, 4, -1}}}, {{{7, 2, 1}, {r, 4, 0.5}}}};
+       }),
+       -1},
+      {with_reference([&](Mesh& m, int r) {
+         m.rigid_connections.push_back({r, {6}, x});
+       }),
+       0},
+      {with_reference([&](Mesh& m, int r) {
+         m.rigid_connections.push_back({r, {6}, moves});
+       }),
+       0},
+      {with_reference([&](Mesh& m, int r) {
+         m.rigid_connections.push_back({r, {6, 7}, moves});
+       }),
+       -1},
+      {with_reference([&](Mesh& m, int r) {
+         m.distributing_connections = {{r, cloud_nodes, {1, 1, 1, 1}, x}};
+       }),
+       0},
+      {with_reference([&](Mesh& m, int r) {
+         m.distributing_connections = {{r, cloud_nodes, {1, 1, 1, 1}, moves}};
+       }),
+       0},
+  };
+  const Mesh plain = with_reference([](Mesh& m, int) { m.nodes.conservativeResize(3, m.nodes.cols() - 1); });
+  const int before = unknowns(plain, assemble(plain).dofs, {}).count;
+  for (size_t i = 0; i < cases.size(); ++i) {
+    const Assembly a = assemble(cases[i].first);
+    const Unknowns u = unknowns(cases[i].first, a.dofs, {});
+    EXPECT_EQ(u.count, before + cases[i].second) << i;
+    EXPECT_GT(definiteness(a, u), 1e-12) << i;
+  }
+}
+
 TEST(RigidConnection, MovesItsNodesAsOneBody) {
   Mesh mesh = frame();
   mesh.rigid_connections = {{4, cloud_nodes, all_components}};

@@ -1,0 +1,157 @@
+#include "fem/check.hpp"
+#include "fem/mesh_file.hpp"
+#include "fem/solid_boom.hpp"
+#include "reduction/geometric_stiffness.hpp"
+#include "reduction/inertia_invariants.hpp"
+#include "reduction/mean_axis.hpp"
+#include "tests/fem/solid_testing.hpp"
+#include "tests/reduction/booms.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <numbers>
+
+namespace flexboom {
+namespace {
+
+Mesh deck(const std::string& name) {
+  return read_mesh(std::filesystem::path(FLEXBOOM_TEST_DATA) / "fem" / "decks" / name).mesh;
+}
+
+struct Modes {
+  Eigen::VectorXd hz;
+  long rigid = 0;  // so called
+  ModalBasis basis;
+};
+
+Modes modes(const Mesh& mesh, const Clamp& clamp, int count) {
+  const Assembly assembly = assemble(mesh);
+  ModalBasis basis = clamped_modes(mesh, assembly, clamp, {.num_modes = count, .sigma = {}, .backend = "auto"});
+  return {basis.omega / (2 * std::numbers::pi), std::ranges::count(basis.kind, ModeKind::rigid), basis};
+}
+
+const Clamp nothing({}, false);
+
+TEST(RigidModes, SupportsInCylindricalAxesHoldAndAreLeftOutOfAFreeBody) {
+  const Mesh mesh = deck("tube_on_cylindrical_supports.inp");
+  const Modes held = modes(mesh, {}, 6), free = modes(mesh, nothing, 8);
+  EXPECT_EQ(held.rigid, 0);
+  EXPECT_EQ(held.basis.rigid_freedoms, 0);
+  EXPECT_EQ(held.basis.frame, "clamped");
+  EXPECT_GT(held.hz(0), 1);
+  EXPECT_EQ(free.rigid, 6);
+  EXPECT_EQ(free.basis.rigid_freedoms, 6);
+  EXPECT_LT(free.hz(5), 1e-3);
+  EXPECT_NEAR(free.hz(6), 35.29, 0.005);
+  EXPECT_NEAR(free.hz(7), 40.01, 0.005);
+}
+
+TEST(RigidModes, InclinedRollersHold) {
+  const Mesh mesh = deck("bar_on_inclined_rollers.inp");
+  const Modes held = modes(mesh, {}, 6), free = modes(mesh, nothing, 7);
+  EXPECT_EQ(held.rigid, 0);
+  EXPECT_EQ(held.basis.frame, "clamped");
+  EXPECT_EQ(free.rigid, 6);
+  const Assembly assembly = assemble(mesh);
+  EXPECT_EQ(reduce(mesh, assembly, held.basis, "bar").frame, "clamped");
+  const GeometricStiffness Kg = geometric_stiffness(mesh, assembly, {}, held.basis.Phi, {});
+  EXPECT_EQ(Kg.spin.size(), 6U);
+  EXPECT_EQ(mean_axis_modes(mesh, assembly, {.num_modes = 3, .sigma = {}}).rigid_freedoms, 0);
+}
+
+// The measure of rigidity knows neither size nor slenderness nor the kind of element.
+TEST(RigidModes, SixOfAnyFreeBody) {
+  for (const double size : {1e-4, 1.0, 1e4}) {
+    for (const double slenderness : {3e-5, 1e-2, 0.2}) {
+      BeamGeometry g = test::boom4(BeamTheory::timoshenko, true, 4, 4);
+      g.segments[0].length = size;
+      g.segments[0].start = g.segments[0].end = RoundBar{slenderness * size};
+      const Mesh mesh = make_mesh(g);
+      EXPECT_EQ(modes(mesh, nothing, 12).rigid, 6) << size << " " << slenderness;
+      EXPECT_EQ(modes(mesh, node_set(mesh, "root"), 6).rigid, 0) << size << " " << slenderness;
+      if (slenderness < 1e-3) continue;
+      SolidOptions options;
+      options.order = 2;
+      options.grading = {.sectors = 1, .rings = 1, .long_elements = 6, .end_layers = 0, .corner_levels = 0};
+      const Mesh solid = make_solid_mesh(g, options);
+      EXPECT_EQ(modes(solid, nothing, 12).rigid, 6) << size << " " << slenderness;
+      EXPECT_EQ(modes(solid, node_set(solid, "root"), 6).rigid, 0) << size << " " << slenderness;
+    }
+  }
+}
+
+TEST(RigidModes, SixOfEveryLoneSolidElement) {
+  for (const ElementType& type : element_types()) {
+    if (!testing::is_solid(type)) continue;
+    const Mesh mesh = testing::one_solid(type, type.orders().front(), [](const Eigen::Vector3d& x) { return x; });
+    for (const char* backend : {"auto", "arpack", "block", "spectra", "dense"}) {
+      for (const int count : {6, 7, 10}) {
+        if (count > 3 * mesh.nodes.cols()) continue;
+        const ModalBasis basis =
+            clamped_modes(mesh, assemble(mesh), nothing, {.num_modes = count, .sigma = {}, .backend = backend});
+        EXPECT_EQ(std::ranges::count(basis.kind, ModeKind::rigid), 6) << type.name << " " << backend << " " << count;
+      }
+    }
+  }
+}
+
+TEST(RigidModes, EveryPartOfABodyInPieces) {
+  Mesh mesh = make_mesh(test::boom4(BeamTheory::timoshenko, true, 2, 4));
+  const auto nodes = static_cast<int>(mesh.nodes.cols());
+  Mesh both = mesh;
+  both.nodes.resize(3, 2 * nodes);
+  both.nodes << mesh.nodes, mesh.nodes.colwise() + Eigen::Vector3d(0, 1, 0);
+  for (Element element : mesh.elements) {
+    for (int& node : element.nodes) node += nodes;
+    both.elements.push_back(element);
+  }
+  const Modes free = modes(both, nothing, 14);
+  EXPECT_EQ(free.rigid, 12);
+  EXPECT_EQ(free.basis.rigid_freedoms, 12);
+  // One part held, the other joined by a ball: three motions without strain.
+  both.supports = {{0, all_components}};
+  for (int k = 0; k < 3; ++k) both.equations.push_back({{{nodes, k, 1}, {nodes - 1, k, -1}}});
+  EXPECT_EQ(modes(both, {}, 6).rigid, 3);
+}
+
+TEST(RigidModes, AReferenceNodeWithOneEquationPerNodeOfAFace) {
+  const Mesh mesh = deck("bar_tied_to_reference_node.inp");
+  const Modes held = modes(mesh, {}, 10);
+  EXPECT_EQ(held.rigid, 0);
+  const Assembly assembly = assemble(mesh);
+  EXPECT_EQ(geometric_stiffness(mesh, assembly, {}, held.basis.Phi, {}).spin.size(), 6U);
+  // The same by equations among the nodes of the face.
+  Mesh plain = mesh;
+  plain.node_sets.clear();
+  const int leader = plain.equations.front().terms.front().node;
+  plain.nodes.conservativeResize(3, plain.nodes.cols() - 1);
+  plain.equations.erase(plain.equations.begin());
+  for (LinearEquation& equation : plain.equations) equation.terms.back().node = leader;
+  const Modes same = modes(plain, {}, 10);
+  EXPECT_LT((held.hz - same.hz).norm(), 1e-9 * same.hz.norm());
+}
+
+TEST(RigidModes, AMeshWithoutMassSaysSo) {
+  Mesh mesh = deck("bar_on_inclined_rollers.inp");
+  for (SolidProperty& property : mesh.solid_properties) property.material.rho = 0;
+  const Assembly assembly = assemble(mesh);
+  try {
+    clamped_modes(mesh, assembly, {}, {.num_modes = 3, .sigma = {}});
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("nothing has mass"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("\"M\""), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("--material E,nu,rho"), std::string::npos) << error.what();
+  }
+}
+
+TEST(RigidModes, MeanAxesNeedABodyThatNoEquationHolds) {
+  Mesh mesh = make_mesh(test::boom4(BeamTheory::timoshenko, true, 2, 4));
+  mesh.equations = {{{{0, 1, 1}, {2, 1, 1}}}};
+  EXPECT_THROW(mean_axis_modes(mesh, assemble(mesh), {.num_modes = 3, .sigma = {}}), InputError);
+}
+
+}  // namespace
+}  // namespace flexboom
