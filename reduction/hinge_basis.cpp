@@ -1,6 +1,7 @@
 #include "reduction/hinge_basis.hpp"
 
 #include "fem/check.hpp"
+#include "reduction/eigen_basis.hpp"
 
 #include <Eigen/Geometry>
 
@@ -36,7 +37,8 @@ struct SprungBody {
   Unknowns left;
   SparseMatrix K;  // clamped
   SparseMatrix M;  // with the border of the rotation, whose motion has unit mass
-  double J = 0;    // inertia about the hinge [kg m^2]
+  VectorXd border;
+  double J = 0;  // inertia about the hinge [kg m^2]
 };
 
 SprungBody sprung_body(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, const HingeSpring& hinge) {
@@ -49,54 +51,65 @@ SprungBody sprung_body(const Mesh& mesh, const Assembly& assembly, const Clamp& 
   h /= std::sqrt(body.J);
   body.left = unknowns(mesh, assembly.dofs, clamp);
   body.K = body.left.reduced(assembly.K);
-  const VectorXd border = body.left.reduced_loads(symmetric_product(assembly.M, h));
-  body.M = bordered(body.left.reduced(assembly.M), border, 1);
+  body.border = body.left.reduced_loads(symmetric_product(assembly.M, h));
+  body.M = bordered(body.left.reduced(assembly.M), body.border, 1);
   return body;
 }
 
-/// Elastic parts (unknowns x found) of the modes that turn the root, at most `wanted`. In a group of equal frequencies
-/// one mode takes the whole rotation.
-MatrixXd elastic_parts(const EigenPairs& pairs, int wanted) {
-  const Index n = pairs.Phi.rows() - 1;
+/// Elastic parts (unknowns x found) of the modes whose inertia turns the hinge, at most `wanted`, however little a
+/// stiff spring gives way. In a group of equal frequencies one mode takes all of it; on a stiff spring the plane of the
+/// hinge and the other one nearly are one.
+MatrixXd elastic_parts(const EigenPairs& pairs, const VectorXd& border, int rigid, int wanted) {
+  constexpr double equal = 1e-5;  // of omega^2
+  const Index n = pairs.Phi.rows() - 1, count = pairs.Phi.cols();
   MatrixXd found(n, 0);
-  const auto group_of = [&pairs](int i) {
-    for (const std::vector<int>& group : pairs.summary.pairs) {
-      if (std::ranges::find(group, i) != group.end()) return group;
-    }
-    return std::vector<int>{i};
-  };
-  for (int i = 0; i < pairs.Phi.cols() && found.cols() < wanted;) {
-    const std::vector<int> group = group_of(i);
-    i = group.back() + 1;
-    const MatrixXd shapes = pairs.Phi(Eigen::all, group);
-    const VectorXd turns = shapes.row(n).transpose();
-    if (turns.norm() < 1e-6) continue;  // the rotation of an M-normal mode, M-norm: this one leaves the root at rest
-    const VectorXd elastic = shapes.topRows(n) * turns.normalized();
-    if (elastic.norm() < 1e-9 * shapes.topRows(n).norm() || pairs.lambda(group.front()) <= 0) continue;
+  for (Index first = rigid, last = 0; first < count && found.cols() < wanted; first = last + 1) {
+    last = first;
+    while (last + 1 < count && pairs.lambda(last + 1) - pairs.lambda(last) <= equal * pairs.lambda(last + 1)) ++last;
+    const auto shapes = pairs.Phi.block(0, first, n, last - first + 1);
+    const VectorXd turns = shapes.transpose() * border;
+    if (turns.norm() < 1e-4) continue;  // of an M-normal mode and a rotation of M-norm 1: another plane
     found.conservativeResize(Eigen::NoChange, found.cols() + 1);
-    found.rightCols<1>() = elastic;
+    found.rightCols<1>() = shapes * turns.normalized();
   }
   return found;
 }
 
+/// The first `modes` that turn the root, fewer where the mesh has no more.
 MatrixXd sprung_shapes(const SprungBody& body, double stiffness, int modes, EigenOptions options) {
   const SparseMatrix K = bordered(body.K, VectorXd::Zero(body.K.cols()), stiffness / body.J);
   options.whole_groups = true;
   for (options.num_modes = 3 * modes + 2;; options.num_modes *= 2) {  // out of plane, and a rigid one, beside each
     options.num_modes = std::min(options.num_modes, static_cast<int>(K.cols()));
     const EigenPairs pairs = solve_modes({K, body.M, stiffness == 0}, options);
-    const auto rigid = stiffness == 0 ? 1 : 0;  // the free rotation bends nothing
-    EigenPairs elastic = pairs;
-    elastic.lambda = pairs.lambda.tail(pairs.lambda.size() - rigid);
-    elastic.Phi = pairs.Phi.rightCols(pairs.lambda.size() - rigid);
-    for (std::vector<int>& group : elastic.summary.pairs) {
-      for (int& i : group) i -= rigid;
-    }
-    const MatrixXd shapes = elastic_parts(elastic, modes);
-    if (shapes.cols() == modes) return shapes;
-    require(options.num_modes < K.cols(), "hinge: the mesh has only " + std::to_string(shapes.cols()) +
-                                              " modes that turn the root, " + std::to_string(modes) + " wanted");
+    const int rigid = stiffness == 0 ? 1 : 0;  // the free rotation bends nothing
+    MatrixXd shapes = elastic_parts(pairs, body.border, rigid, modes);
+    if (shapes.cols() == modes || options.num_modes == K.cols()) return shapes;
   }
+}
+
+/// M-orthonormal shapes: `modes` for each spring. Shapes of neighbouring springs are nearly parallel. Where one adds
+/// nothing to the others that solvers could tell from round-off, a higher mode of the first spring takes its place.
+MatrixXd independent_shapes(const SparseMatrix& M, const SprungBody& body, const std::vector<double>& stiffness,
+                            int modes, const EigenOptions& options) {
+  constexpr double told_apart = 1e-5;
+  MassBasis basis(M, modes * std::ssize(stiffness));
+  const auto append = [&](const MatrixXd& shapes) {
+    const MatrixXd X = body.left.expanded(shapes);
+    const VectorXd norm = X.cwiseProduct(symmetric_product(M, X)).colwise().sum().cwiseSqrt();
+    basis.append(X * norm.cwiseInverse().asDiagonal(), told_apart);
+  };
+  for (const double k : stiffness) {
+    const MatrixXd shapes = sprung_shapes(body, k, modes, options);
+    require(shapes.cols() == modes, "hinge: the mesh has only " + std::to_string(shapes.cols()) +
+                                        " modes that turn the root, " + std::to_string(modes) + " wanted");
+    append(shapes);
+  }
+  const auto missing = static_cast<int>(basis.capacity() - basis.size());
+  if (missing == 0) return basis.vectors();
+  const MatrixXd more = sprung_shapes(body, stiffness.front(), modes + missing, options);
+  if (more.cols() > modes) append(more.rightCols(more.cols() - modes));
+  return basis.vectors();
 }
 
 }  // namespace
@@ -110,11 +123,12 @@ ModalBasis hinge_adapted_modes(const Mesh& mesh, const Assembly& assembly, const
   require(modes >= 1, "hinge: at least one mode per stiffness, " + std::to_string(modes) + " asked for");
   require(rigid_freedoms(mesh, assembly.dofs, clamp) == 0, "hinge: the clamp does not hold the root");
   const SprungBody body = sprung_body(mesh, assembly, clamp, hinge);
-  MatrixXd shapes(body.K.cols(), modes * std::ssize(hinge.stiffness));
-  for (size_t i = 0; i < hinge.stiffness.size(); ++i) {
-    shapes.middleCols(static_cast<Index>(i) * modes, modes) = sprung_shapes(body, hinge.stiffness[i], modes, options);
-  }
-  ModalBasis basis = ritz_modes(mesh, assembly, clamp, body.left.expanded(shapes), 0, threads);
+  const MatrixXd X = independent_shapes(assembly.M, body, hinge.stiffness, modes, options);
+  ModalBasis basis = ritz_modes(mesh, assembly, clamp, X, 0, threads);
+  const auto asked = modes * std::ssize(hinge.stiffness);
+  if (X.cols() < asked)
+    basis.summary.note = "hinge: the springs have only " + std::to_string(X.cols()) +
+                         " shapes that can be told apart, " + std::to_string(asked) + " wanted";
   basis.unknowns = body.left.count;
   return basis;
 }

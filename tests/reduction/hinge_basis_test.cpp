@@ -1,10 +1,14 @@
 #include "reduction/hinge_basis.hpp"
 
 #include "fem/check.hpp"
+#include "fem/solid_boom.hpp"
+#include "reduction/certificate.hpp"
 #include "reduction/eq14.hpp"
 #include "reduction/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
@@ -125,6 +129,56 @@ TEST(HingeAdapted, MoreModesPerRegimeAreExactToo) {
       EXPECT_NEAR(sprung_hz(body, axis, stiffness_of(2, regime))(mode - 1) / hz_of(2, regime, mode), 1, 1e-8)
           << regime << mode;
     }
+  }
+}
+
+/// Sections of every kind, as beams, and two of them as solids.
+std::vector<Mesh> every_section() {
+  const std::vector<SectionShape> sections = {RoundBar{0.01}, Tube{0.01, 0.0005}, Rectangle{0.02, 0.01},
+                                              Rectangle{0.01, 0.01}, RectangularTube{0.02, 0.01, 0.001}};
+  std::vector<Mesh> meshes;
+  for (const SectionShape& section : sections) {
+    BeamGeometry g = test::boom4(BeamTheory::timoshenko, true, 3, 5);
+    g.segments[0].start = g.segments[0].end = section;
+    meshes.push_back(make_mesh(g));
+    if (!std::holds_alternative<RoundBar>(section) && !std::holds_alternative<Rectangle>(section)) continue;
+    SolidOptions options;
+    options.order = 2;
+    options.grading = {.sectors = 1, .rings = 1, .long_elements = 5, .end_layers = 0, .corner_levels = 0};
+    meshes.push_back(make_solid_mesh(g, options));
+  }
+  return meshes;
+}
+
+TEST(HingeAdapted, EverySectionSeveralSpringsAndCounts) {
+  const Eigen::Vector3d axis(0, 0, 1);
+  int mesh_number = 0;
+  for (const Mesh& mesh : every_section()) {
+    const Assembly assembly = assemble(mesh);
+    for (const std::vector<double>& k :
+         std::vector<std::vector<double>>{{5}, {5, 2000}, {0, 5, 2000}, {5, 5.0001}, {7, 7}}) {
+      for (const int count : {1, 2, 3, 5}) {
+        const auto where = [&] {
+          return fmt::format("mesh {}, k {}, count {}", mesh_number, fmt::join(k, " "), count);
+        };
+        const ModalBasis basis =
+            hinge_adapted_modes(mesh, assembly, node_set(mesh, "root"), {Eigen::Vector3d::Zero(), axis, k}, count);
+        const auto asked = static_cast<Index>(k.size()) * count;
+        EXPECT_TRUE(basis.Phi.cols() == asked || (basis.Phi.cols() < asked && !basis.summary.note.empty())) << where();
+        const ReducedBody body = reduce(mesh, assembly, basis, "boom");
+        for (const BodyCheck& c : body_checks(body)) EXPECT_TRUE(c.passed) << where() << " " << c.name << c.value;
+        // More shapes leave the sprung frequencies of the first regime where they are.
+        const ReducedBody alone = reduce(
+            mesh, assembly,
+            hinge_adapted_modes(mesh, assembly, node_set(mesh, "root"), {Eigen::Vector3d::Zero(), axis, {k[0]}}, count),
+            "boom");
+        const double spring = std::max(k[0], 1e-6);
+        const VectorXd all = sprung_hz(body, axis, spring), own = sprung_hz(alone, axis, spring);
+        for (int mode = 0; mode < count; ++mode)
+          EXPECT_NEAR(all(mode) / own(mode), 1, 1e-6) << where() << " mode " << mode;
+      }
+    }
+    ++mesh_number;
   }
 }
 
