@@ -102,9 +102,10 @@ void require_property(const Mesh& mesh, const Element& element) {
           fmt::format("solid property {} is missing; the mesh has {}", element.property, mesh.solid_properties.size()));
 }
 
-void throw_inverted(double determinant, const std::string& place) {
+void throw_inverted(double determinant, int point) {
   throw InputError(
-      fmt::format("inverted (Jacobian {:.2g} at {}); reorder its nodes or repair the mesh", determinant, place));
+      fmt::format("inverted (Jacobian {:.2g} at integration point {}); reorder its nodes or repair the mesh",
+                  determinant, point + 1));
 }
 
 }  // namespace flexboom::elasticity

@@ -59,7 +59,7 @@ inline bool is_valid(const Eigen::Matrix3d& J, double determinant) {
 /// @throws InputError when the solid property is missing.
 void require_property(const Mesh&, const Element&);
 
-/// @throws InputError that says where an element is inverted.
-[[noreturn]] void throw_inverted(double determinant, const std::string& place);
+/// @throws InputError that says at which integration point (from 0) an element is inverted.
+[[noreturn]] void throw_inverted(double determinant, int point);
 
 }  // namespace flexboom::elasticity

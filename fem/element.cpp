@@ -53,6 +53,7 @@ int fixed_count(int) {
   return count;
 }
 int no_internal_freedoms(const Mesh&, const Element&) { return 0; }
+int no_inverted_node(const Mesh&, const Element&) { return -1; }
 
 constexpr std::array<int, 1> first_order = {1}, second_order = {2};
 constexpr std::array<int, 12> beam_orders = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
@@ -75,7 +76,8 @@ constexpr ElementType beam_row(std::string_view name) {
           beam::position,
           beam::energy_strains,
           beam::add_prestress_work,
-          beam::validate};
+          beam::validate,
+          no_inverted_node};
 }
 
 template <class Type, class Strains = Type>
@@ -95,7 +97,8 @@ constexpr ElementType solid_row(std::string_view name, Shape shape, int (*node_c
           Type::position,
           Strains::energy_strains,
           Strains::add_prestress_work,
-          Type::validate};
+          Type::validate,
+          Type::inverted_node};
 }
 
 // The table: one row per element.

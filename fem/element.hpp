@@ -51,6 +51,9 @@ struct ElementType {
                              const Eigen::Ref<const Eigen::MatrixXd>& q, Eigen::Ref<Eigen::MatrixXd> work);
   /// @throws InputError on what makes the element impossible (zero length, inverted, property missing or in conflict).
   void (*validate)(const Mesh&, const Element&);
+  /// The first of the element's own nodes at which the Jacobian is not positive, -1 if there is none. Such an element
+  /// is bad and not impossible: nothing is integrated there.
+  int (*inverted_node)(const Mesh&, const Element&);
 };
 
 /// The table of elements, one row each: beams, hexahedra of any order, and the shapes that decks carry.

@@ -225,16 +225,15 @@ elasticity::FieldSlopes field_slopes(const LineTable& line, const Metric& at, co
   return fields;
 }
 
-void require_upright(const LineTable& table, const Mesh& mesh, const Element& element, bool nodes) {
+// The first point of a table at which the Jacobian is not positive, and its determinant; -1: none.
+std::pair<int, double> inverted_point(const LineTable& table, const Mesh& mesh, const Element& element) {
   const std::array<MatrixXd, 3> slopes = slopes_at_points(table, elasticity::local_positions(mesh, element));
   for (Index q = 0; q < slopes[0].cols(); ++q) {
     const Matrix3d J = jacobian(slopes, q);
     const double determinant = J.determinant();
-    if (elasticity::is_valid(J, determinant)) continue;
-    elasticity::throw_inverted(determinant,
-                               nodes ? fmt::format("node {}", mesh.node_label(element.nodes[static_cast<size_t>(q)]))
-                                     : fmt::format("integration point {}", q + 1));
+    if (!elasticity::is_valid(J, determinant)) return {static_cast<int>(q), determinant};
   }
+  return {-1, 0};
 }
 
 }  // namespace
@@ -325,8 +324,14 @@ void Hexahedron::validate(const Mesh& mesh, const Element& element) {
   elasticity::require_property(mesh, element);
   lobatto_basis(element.order);  // throws where there is none
   const OrderTables& tables = order_tables(element.order);
-  require_upright(tables.stiffness, mesh, element, false);
-  require_upright(tables.nodes, mesh, element, true);
+  for (const LineTable* table : {&tables.stiffness, &tables.mass}) {
+    const auto [q, determinant] = inverted_point(*table, mesh, element);
+    if (q >= 0) elasticity::throw_inverted(determinant, q);
+  }
+}
+
+int Hexahedron::inverted_node(const Mesh& mesh, const Element& element) {
+  return inverted_point(order_tables(element.order).nodes, mesh, element).first;
 }
 
 }  // namespace flexboom

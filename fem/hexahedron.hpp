@@ -21,9 +21,9 @@ struct Hexahedron {
   static Eigen::MatrixXd energy_strains(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
   static void add_prestress_work(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
                                  const Eigen::Ref<const Eigen::MatrixXd>& q, Eigen::Ref<Eigen::MatrixXd> work);
-  /// @throws InputError for an order that does not exist and a Jacobian that is not positive at all strain points and
-  /// nodes.
+  /// @throws InputError for an order that does not exist and a Jacobian that is not positive at all integration points.
   static void validate(const Mesh&, const Element&);
+  static int inverted_node(const Mesh&, const Element&);
 };
 
 }  // namespace flexboom

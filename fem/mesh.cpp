@@ -200,6 +200,25 @@ int coincident_nodes(const Mesh& mesh) {
   return count;
 }
 
+/// Elements whose Jacobian is not positive at a node; empty if there is none.
+std::string inverted_corners(const Mesh& mesh) {
+  int count = 0;
+  std::string first;
+  for (int e = 0; e < std::ssize(mesh.elements); ++e) {
+    const Element& element = mesh.elements[static_cast<size_t>(e)];
+    const int node = type_of(element).inverted_node(mesh, element);
+    if (node < 0) continue;
+    if (count++ == 0)
+      first = fmt::format("{} at node {}", element_name(mesh, e),
+                          mesh.node_label(element.nodes[static_cast<size_t>(node)]));
+  }
+  if (count == 0) return "";
+  return fmt::format(
+      "{} elements have a Jacobian that is not positive at a node, the first is {}; what is integrated "
+      "there is coarse: repair the mesh",
+      count, first);
+}
+
 }  // namespace
 
 long Mesh::node_label(int node) const { return node_labels.empty() ? node : node_labels[static_cast<size_t>(node)]; }
@@ -252,6 +271,7 @@ int part_count(const Mesh& mesh) {
 
 std::vector<std::string> suspicions(const Mesh& mesh) {
   std::vector<std::string> result;
+  if (std::string inverted = inverted_corners(mesh); !inverted.empty()) result.push_back(std::move(inverted));
   if (const int parts = part_count(mesh); parts > 1)
     result.push_back(fmt::format("the mesh has {} parts that nothing joins; each moves on its own", parts));
   if (const int twins = coincident_nodes(mesh); twins > 0)

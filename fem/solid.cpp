@@ -124,15 +124,11 @@ const Table& mass_table() {
   return table;
 }
 
-// Where validate looks: points of both rules, then the nodes.
 template <SolidKind kind>
-const Table& check_table() {
+const Table& node_table() {
   static const Table table = [] {
-    const PointRule stiffness = recipe<kind>.stiffness_rule();
-    const Index points = stiffness.weights.size(), nodes = recipe<kind>.nodes;
-    PointRule rule{Matrix3Xd(3, points + nodes), VectorXd::Zero(points + nodes)};
-    rule.points << stiffness.points, recipe<kind>.positions().leftCols(nodes);
-    return make_table(recipe<kind>, rule);
+    const Index nodes = recipe<kind>.nodes;
+    return make_table(recipe<kind>, {recipe<kind>.positions().leftCols(nodes), VectorXd::Zero(nodes)});
   }();
   return table;
 }
@@ -225,18 +221,14 @@ void visit_strains(const Table& table, const Mesh& mesh, const Element& element,
   }
 }
 
-void require_upright(const Table& table, const Mesh& mesh, const Element& element) {
+// The first point of a table at which the Jacobian is not positive; -1: none.
+int inverted_point(const Table& table, const Mesh& mesh, const Element& element) {
   const MatrixX3d J = jacobians(table, elasticity::local_positions(mesh, element));
-  const Index points = table.weights.size() - std::ssize(element.nodes);
   for (Index q = 0; q < table.weights.size(); ++q) {
     const Matrix3d slopes = J.middleRows<3>(3 * q).transpose();
-    const double determinant = slopes.determinant();
-    if (elasticity::is_valid(slopes, determinant)) continue;
-    const std::string place =
-        q < points ? fmt::format("integration point {}", q + 1)
-                   : fmt::format("node {}", mesh.node_label(element.nodes[static_cast<size_t>(q - points)]));
-    elasticity::throw_inverted(determinant, place);
+    if (!elasticity::is_valid(slopes, slopes.determinant())) return static_cast<int>(q);
   }
+  return -1;
 }
 
 }  // namespace
@@ -293,7 +285,17 @@ void Solid<kind>::add_prestress_work(const Mesh& mesh, const Element& element, c
 template <SolidKind kind>
 void Solid<kind>::validate(const Mesh& mesh, const Element& element) {
   elasticity::require_property(mesh, element);
-  require_upright(check_table<kind>(), mesh, element);
+  for (const Table* table : {&stiffness_table<kind>(), &mass_table<kind>()}) {
+    const int q = inverted_point(*table, mesh, element);
+    if (q < 0) continue;
+    const MatrixX3d J = jacobians(*table, elasticity::local_positions(mesh, element));
+    elasticity::throw_inverted(Matrix3d(J.middleRows<3>(3 * q)).determinant(), q);
+  }
+}
+
+template <SolidKind kind>
+int Solid<kind>::inverted_node(const Mesh& mesh, const Element& element) {
+  return inverted_point(node_table<kind>(), mesh, element);
 }
 
 template struct Solid<SolidKind::hex8>;

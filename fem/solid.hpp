@@ -20,8 +20,9 @@ struct Solid {
   static Eigen::MatrixXd energy_strains(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
   static void add_prestress_work(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
                                  const Eigen::Ref<const Eigen::MatrixXd>& q, Eigen::Ref<Eigen::MatrixXd> work);
-  /// @throws InputError unless the Jacobian is positive at all strain points and nodes.
+  /// @throws InputError unless the Jacobian is positive at all integration points.
   static void validate(const Mesh&, const Element&);
+  static int inverted_node(const Mesh&, const Element&);
 };
 
 }  // namespace flexboom
