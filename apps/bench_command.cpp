@@ -1,8 +1,8 @@
 #include "apps/bench_modes.hpp"
 #include "apps/commands.hpp"
 #include "apps/plot.hpp"
-#include "apps/subprocess.hpp"
 #include "fem/files.hpp"
+#include "fem/process.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -1,8 +1,8 @@
 #include "apps/bench_modes.hpp"
 
-#include "apps/subprocess.hpp"
 #include "fem/check.hpp"
 #include "fem/mesh_file.hpp"
+#include "fem/process.hpp"
 #include "fem/solid_boom.hpp"
 #include "fem/write_abaqus.hpp"
 
@@ -40,7 +40,7 @@ void run_flexboom(ModesBench& row, const std::filesystem::path& file, const std:
       this_program(),       "modes", file.filename().string(), "--json", "--quiet", "--threads", "1", "--count",
       std::to_string(modes)};
   command.insert(command.end(), options.begin(), options.end());
-  const ProcessResult run = run_process(command, file.parent_path());
+  const ProcessResult run = run_process(command, {.folder = file.parent_path(), .one_thread = true});
   require(run.exit_code == 0, fmt::format("bench: flexboom modes {} ended with code {}", file.string(), run.exit_code));
   const auto answer = nlohmann::json::parse(run.output);
   hz = answer.at("frequencies_hz").get<std::vector<double>>();
@@ -67,7 +67,8 @@ std::vector<double> calculix_frequencies(const std::filesystem::path& file) {
 void run_calculix(ModesBench& row, const std::filesystem::path& deck, const std::vector<double>& hz) {
   const std::string program = program_on_path("ccx");
   if (program.empty()) return;
-  const ProcessResult run = run_process({program, deck.stem().string()}, deck.parent_path());
+  const ProcessResult run =
+      run_process({program, deck.stem().string()}, {.folder = deck.parent_path(), .one_thread = true});
   if (run.exit_code != 0) return;
   row.ccx_seconds = run.seconds;
   row.ccx_memory_mb = run.memory_mb;

@@ -4,6 +4,7 @@
 
 #include <Spectra/Util/Version.h>
 #include <fmt/format.h>
+#include <openssl/opensslv.h>
 #include <sundials/sundials_config.h>
 #include <toml++/impl/version.h>
 #include <CLI/Version.hpp>
@@ -32,6 +33,8 @@ std::string version_text() {
   line("pugixml, zlib", "", "MIT, zlib");
   line("HDF5, matio", "", "BSD-3-Clause, BSD-2-Clause");
   line("BLAS, LAPACK", "", fmt::format("{}; OpenBLAS is BSD-3-Clause", running["blas"]).c_str());
+  line("LAPACKE", "", "BSD-3-Clause");
+  line("OpenSSL", OPENSSL_VERSION_STR, "Apache-2.0 (libcrypto)");
   line("GNU runtime", "", "GPL-3.0+ with the runtime exception (libgomp, libgfortran)");
   line("ARPACK-NG", "3.8", "BSD-3-Clause");
   line("Spectra", fmt::format("{}.{}.{}", SPECTRA_MAJOR_VERSION, SPECTRA_MINOR_VERSION, SPECTRA_PATCH_VERSION),

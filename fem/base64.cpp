@@ -1,61 +1,52 @@
 #include "fem/base64.hpp"
 
+#include <openssl/evp.h>
+
+#include <algorithm>
 #include <array>
-#include <cstdint>
 #include <utility>
 
 namespace flexboom {
 namespace {
 
-constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-constexpr std::uint8_t none = 255;
-
-constexpr std::array<std::uint8_t, 256> make_digits() {
-  std::array<std::uint8_t, 256> digits{};
-  digits.fill(none);
-  for (std::uint8_t i = 0; i < 64; ++i) digits[static_cast<unsigned char>(alphabet[i])] = i;
-  return digits;
-}
-
-constexpr std::array<std::uint8_t, 256> digits = make_digits();
-
-std::uint32_t byte_at(std::string_view bytes, size_t i) {
-  return i < bytes.size() ? static_cast<unsigned char>(bytes[i]) : 0U;
-}
-
 bool is_blank(char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; }
+
+const unsigned char* bytes_of(const char* text) { return reinterpret_cast<const unsigned char*>(text); }
+unsigned char* bytes_of(char* text) { return reinterpret_cast<unsigned char*>(text); }
 
 }  // namespace
 
 std::string base64(std::string_view bytes) {
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    const std::uint32_t group = byte_at(bytes, i) << 16 | byte_at(bytes, i + 1) << 8 | byte_at(bytes, i + 2);
-    for (int shift = 18; shift >= 0; shift -= 6) text += alphabet[group >> shift & 63];
-  }
-  const size_t padding = (3 - bytes.size() % 3) % 3;
-  text.replace(text.size() - padding, padding, padding, '=');
+  // EVP_EncodeBlock counts in int, and ends its text with a zero.
+  constexpr size_t piece = size_t{3} << 24;
+  std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');
+  size_t written = 0;
+  for (; !bytes.empty(); bytes.remove_prefix(std::min(piece, bytes.size())))
+    written += static_cast<size_t>(EVP_EncodeBlock(bytes_of(text.data() + written), bytes_of(bytes.data()),
+                                                   static_cast<int>(std::min(piece, bytes.size()))));
+  text.resize(written);
   return text;
 }
 
-// Decodes four characters; padding ends a piece.
-bool ByteStream::take_group() {
-  std::uint32_t group = 0;
-  int characters = 0, padding = 0;
-  size_t i = 0;
-  for (; i < data_.size() && characters < 4; ++i) {
+// Decodes up to as many groups of four characters as `wanted` bytes need; padding ends a piece.
+bool ByteStream::take_groups(size_t wanted) {
+  constexpr size_t most = 4096;  // characters
+  std::array<char, most> text{};
+  const size_t enough = std::min(most, (wanted + 2) / 3 * 4);
+  size_t count = 0, padding = 0, i = 0;
+  for (; i < data_.size() && count < enough && (padding == 0 || count % 4 != 0); ++i) {
     const char c = data_[i];
     if (is_blank(c)) continue;
-    const std::uint8_t digit = c == '=' ? 0 : digits[static_cast<unsigned char>(c)];
-    if (digit == none || (padding > 0 && c != '=')) return false;
+    if (padding > 0 && c != '=') return false;
     padding += c == '=';
-    group = group << 6 | digit;
-    ++characters;
+    text[count++] = c;
   }
+  if (count == 0 || count % 4 != 0 || padding > 2) return false;
   data_.remove_prefix(i);
-  if (characters < 4 || padding > 2) return false;
-  for (int k = 0; k < 3 - padding; ++k) decoded_ += static_cast<char>(group >> (16 - 8 * k) & 255);
+  std::array<char, most / 4 * 3> bytes{};
+  const int decoded = EVP_DecodeBlock(bytes_of(bytes.data()), bytes_of(text.data()), static_cast<int>(count));
+  if (decoded < 0 || static_cast<size_t>(decoded) != count / 4 * 3) return false;  // it passes over "-" at the end
+  decoded_.append(bytes.data(), static_cast<size_t>(decoded) - padding);
   return true;
 }
 
@@ -69,7 +60,7 @@ std::optional<std::string> ByteStream::take(size_t count) {
   }
   decoded_.reserve(count + 3);
   while (decoded_.size() < count) {
-    if (!take_group()) return {};
+    if (!take_groups(count - decoded_.size())) return {};
   }
   std::string rest = decoded_.substr(count);
   decoded_.resize(count);

@@ -6,7 +6,7 @@
 
 namespace flexboom {
 
-/// Base64 of RFC 4648, padded.
+/// Base64 of RFC 4648, padded; by OpenSSL.
 std::string base64(std::string_view bytes);
 
 /// Takes bytes one after the other out of base64 text that may consist of several padded pieces, or out of raw bytes.
@@ -19,7 +19,7 @@ class ByteStream {
   std::optional<std::string> take(size_t count);
 
  private:
-  bool take_group();
+  bool take_groups(size_t wanted);
 
   std::string_view data_;
   bool is_base64_;

@@ -3,20 +3,9 @@
 #include "fem/blas_threads.hpp"
 #include "fem/check.hpp"
 
+#include <cblas.h>
 #include <fmt/format.h>
-
-// Fortran BLAS and LAPACK, 32-bit integers.
-extern "C" void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k,
-                       const double* alpha, const double* a, const int* lda, const double* b, const int* ldb,
-                       const double* beta, double* c, const int* ldc);
-extern "C" void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha,
-                       const double* a, const int* lda, const double* beta, double* c, const int* ldc);
-extern "C" void dgeev_(const char* left, const char* right, const int* n, double* a, const int* lda, double* real,
-                       double* imaginary, double* left_vectors, const int* ld_left, double* right_vectors,
-                       const int* ld_right, double* work, const int* work_size, int* info);
-extern "C" void dgetrf_(const int* m, const int* n, double* a, const int* lda, int* pivots, int* info);
-extern "C" void dgetri_(const int* n, double* a, const int* lda, const int* pivots, double* work, const int* work_size,
-                        int* info);
+#include <lapacke.h>
 
 namespace flexboom {
 
@@ -34,8 +23,8 @@ void add_product(Ref<MatrixXd> Y, double factor, Transposed transposed, const Re
   const auto m = static_cast<int>(rows), n = static_cast<int>(Y.cols()), k = static_cast<int>(inner);
   const auto lda = static_cast<int>(A.outerStride()), ldx = static_cast<int>(X.outerStride()),
              ldy = static_cast<int>(Y.outerStride());
-  const double one = 1;
-  dgemm_(turned ? "T" : "N", "N", &m, &n, &k, &factor, A.data(), &lda, X.data(), &ldx, &one, Y.data(), &ldy);
+  cblas_dgemm(CblasColMajor, turned ? CblasTrans : CblasNoTrans, CblasNoTrans, m, n, k, factor, A.data(), lda, X.data(),
+              ldx, 1, Y.data(), ldy);
 }
 
 void add_gram(Ref<MatrixXd> Y, const Ref<const MatrixXd>& A) {
@@ -44,8 +33,7 @@ void add_gram(Ref<MatrixXd> Y, const Ref<const MatrixXd>& A) {
   if (A.size() == 0) return;
   const auto n = static_cast<int>(A.rows()), k = static_cast<int>(A.cols());
   const auto lda = static_cast<int>(A.outerStride()), ldy = static_cast<int>(Y.outerStride());
-  const double one = 1;
-  dsyrk_("L", "N", &n, &k, &one, A.data(), &lda, &one, Y.data(), &ldy);
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, n, k, 1, A.data(), lda, 1, Y.data(), ldy);
 }
 
 MatrixXd transposed_product(const Ref<const MatrixXd>& A, const Ref<const MatrixXd>& X) {
@@ -66,16 +54,14 @@ RealEigenvectors eigenvectors(MatrixXd A) {
   RealEigenvectors result{Eigen::VectorXd(n), Eigen::VectorXd(n), MatrixXd(n, n)};
   if (n == 0) return result;
   const OneBlasThread alone;  // the same digits for any number of threads
-  const int ask = -1, one = 1;
-  int info = 0;
-  double best = 0;
   const auto run = [&](double* work, int size) {
-    dgeev_("N", "V", &n, A.data(), &n, result.real.data(), result.imaginary.data(), nullptr, &one,
-           result.vectors.data(), &n, work, &size, &info);
+    return LAPACKE_dgeev_work(LAPACK_COL_MAJOR, 'N', 'V', n, A.data(), n, result.real.data(), result.imaginary.data(),
+                              nullptr, 1, result.vectors.data(), n, work, size);
   };
-  run(&best, ask);
+  double best = 0;
+  run(&best, -1);  // asks for the size
   Eigen::VectorXd work(static_cast<Eigen::Index>(best));
-  run(work.data(), static_cast<int>(work.size()));
+  const int info = run(work.data(), static_cast<int>(work.size()));
   if (info != 0 || !result.vectors.allFinite())
     throw NumericalError(fmt::format("eigenvectors: LAPACK failed ({}) on a matrix of {} rows", info, n));
   return result;
@@ -87,12 +73,10 @@ MatrixXd inverse(MatrixXd A) {
   if (n == 0) return A;
   const OneBlasThread alone;
   Eigen::VectorXi pivots(n);
-  int info = 0;
-  dgetrf_(&n, &n, A.data(), &n, pivots.data(), &info);
+  int info = LAPACKE_dgetrf_work(LAPACK_COL_MAJOR, n, n, A.data(), n, pivots.data());
   constexpr int panel = 64;
-  const int size = panel * n;
-  Eigen::VectorXd work(size);
-  if (info == 0) dgetri_(&n, A.data(), &n, pivots.data(), work.data(), &size, &info);
+  Eigen::VectorXd work(panel * n);
+  if (info == 0) info = LAPACKE_dgetri_work(LAPACK_COL_MAJOR, n, A.data(), n, pivots.data(), work.data(), panel * n);
   if (info != 0) throw NumericalError(fmt::format("inverse: a pivot is zero ({}) in a matrix of {} rows", info, n));
   return A;
 }

@@ -4,18 +4,15 @@
 #include "fem/files.hpp"
 #include "fem/gmsh.hpp"
 #include "fem/gmsh_script.hpp"
+#include "fem/process.hpp"
 #include "fem/text_reader.hpp"
 
 #include <fmt/format.h>
 
-#include <fcntl.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <cstdlib>
 #include <string>
 #include <system_error>
@@ -47,44 +44,9 @@ class WorkFolder {
   fs::path path_;
 };
 
-/// Where a started program gets its input and leaves its output.
-class Streams {
- public:
-  explicit Streams(const fs::path& output) {
-    posix_spawn_file_actions_init(&actions_);
-    posix_spawn_file_actions_addopen(&actions_, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_addopen(&actions_, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    posix_spawn_file_actions_adddup2(&actions_, STDOUT_FILENO, STDERR_FILENO);
-  }
-  Streams(const Streams&) = delete;
-  Streams& operator=(const Streams&) = delete;
-  ~Streams() { posix_spawn_file_actions_destroy(&actions_); }
-
-  const posix_spawn_file_actions_t* actions() const { return &actions_; }
-
- private:
-  posix_spawn_file_actions_t actions_;
-};
-
-/// Runs a program of PATH without a shell. Returns its exit code, 127 when it is not there.
-int run(std::vector<std::string> words, const fs::path& output) {
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  const Streams streams(output);
-  pid_t child = 0;
-  const int code = ::posix_spawnp(&child, arguments[0], streams.actions(), nullptr, arguments.data(), environ);
-  if (code == ENOENT) return 127;
-  require(code == 0, fmt::format("cannot start {}: {}", words[0], std::generic_category().message(code)));
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0) require(errno == EINTR, fmt::format("lost {}", words[0]));
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-}
-
 // The first line in which gmsh says that something is an error, else the last.
-std::string complaint(const fs::path& output) {
-  const std::string text = file_bytes(output);
-  TextReader reader(text, "");
+std::string complaint(const std::string& output) {
+  TextReader reader(output, "");
   std::string last;
   while (const auto line = reader.next_line()) {
     if (!trimmed(*line).empty()) last = trimmed(*line);
@@ -93,10 +55,11 @@ std::string complaint(const fs::path& output) {
   return last.empty() ? "no output" : last;
 }
 
-std::vector<std::string> command(const fs::path& path, const fs::path& mesh, bool has_unit, bool has_order) {
+std::vector<std::string> command(const std::string& program, const fs::path& path, const fs::path& mesh, bool has_unit,
+                                 bool has_order) {
   // An absolute path cannot be taken for an option.
   std::vector<std::string> words = {
-      "gmsh", fs::absolute(path).string(), "-3", "-format", "msh41", "-bin", "-o", mesh.string(), "-v", "3"};
+      program, fs::absolute(path).string(), "-3", "-format", "msh41", "-bin", "-o", mesh.string(), "-v", "3"};
   if (!has_order) words.insert(words.end(), {"-order", "2"});
   if (has_unit) words.insert(words.end(), {"-setstring", "Geometry.OCCTargetUnit", "M"});
   return words;
@@ -112,12 +75,13 @@ MeshFile mesh_with_gmsh(const fs::path& path, const ReadOptions& options) {
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   const bool is_step = extension == ".step" || extension == ".stp", is_script = extension == ".geo";
   const WorkFolder folder;
-  const fs::path mesh = folder.path() / "mesh.msh", output = folder.path() / "output.txt";
-  const int code = run(command(path, mesh, is_step, is_script), output);
-  require(code != 127,
+  const fs::path mesh = folder.path() / "mesh.msh";
+  const std::string program = program_on_path("gmsh");
+  require(!program.empty(),
           fmt::format("{}: to mesh a geometry, the program gmsh must be in PATH (Debian: gmsh)", path.string()));
-  require(code == 0 && fs::exists(mesh),
-          fmt::format("{}: gmsh made no mesh (exit code {}): {}", path.string(), code, complaint(output)));
+  const ProcessResult gmsh = run_process(command(program, path, mesh, is_step, is_script), {.keeps_errors = true});
+  require(gmsh.exit_code == 0 && fs::exists(mesh), fmt::format("{}: gmsh made no mesh (exit code {}): {}",
+                                                               path.string(), gmsh.exit_code, complaint(gmsh.output)));
   MeshFile result = read_gmsh(file_bytes(mesh), path.string());
   result.notes.push_back(fmt::format(
       "meshed by gmsh{}{}; sizes of elements are set in a .geo file (Merge \"{}\"; Mesh.MeshSizeMax = ...;)",

@@ -1,79 +1,33 @@
 #include "reduction/sha256.hpp"
 
-#include <fmt/format.h>
+#include "fem/check.hpp"
 
-#include <algorithm>
-#include <bit>
+#include <fmt/format.h>
+#include <openssl/evp.h>
+
+#include <array>
 
 namespace flexboom {
 namespace {
 
-constexpr size_t block_size = 64;
-
-// The first 32 bits of the fractional parts of the cube roots of the first 64 primes (FIPS 180-4, 4.2.2).
-constexpr std::array<std::uint32_t, 64> constants = {
-    0x428a2f98, 0x71374491, 0xb5c0fbcf, 0xe9b5dba5, 0x3956c25b, 0x59f111f1, 0x923f82a4, 0xab1c5ed5,
-    0xd807aa98, 0x12835b01, 0x243185be, 0x550c7dc3, 0x72be5d74, 0x80deb1fe, 0x9bdc06a7, 0xc19bf174,
-    0xe49b69c1, 0xefbe4786, 0x0fc19dc6, 0x240ca1cc, 0x2de92c6f, 0x4a7484aa, 0x5cb0a9dc, 0x76f988da,
-    0x983e5152, 0xa831c66d, 0xb00327c8, 0xbf597fc7, 0xc6e00bf3, 0xd5a79147, 0x06ca6351, 0x14292967,
-    0x27b70a85, 0x2e1b2138, 0x4d2c6dfc, 0x53380d13, 0x650a7354, 0x766a0abb, 0x81c2c92e, 0x92722c85,
-    0xa2bfe8a1, 0xa81a664b, 0xc24b8b70, 0xc76c51a3, 0xd192e819, 0xd6990624, 0xf40e3585, 0x106aa070,
-    0x19a4c116, 0x1e376c08, 0x2748774c, 0x34b0bcb5, 0x391c0cb3, 0x4ed8aa4a, 0x5b9cca4f, 0x682e6ff3,
-    0x748f82ee, 0x78a5636f, 0x84c87814, 0x8cc70208, 0x90befffa, 0xa4506ceb, 0xbef9a3f7, 0xc67178f2};
-
-std::uint32_t big_endian(const char* bytes) {
-  std::uint32_t word = 0;
-  for (int i = 0; i < 4; ++i) word = word << 8 | static_cast<unsigned char>(bytes[i]);
-  return word;
+void check(int code) {
+  if (code != 1) throw NumericalError("SHA-256: OpenSSL refused");
 }
 
 }  // namespace
 
-void Sha256::add(std::string_view bytes) {
-  bytes_ += bytes.size();
-  if (!rest_.empty()) {
-    const size_t taken = std::min(block_size - rest_.size(), bytes.size());
-    rest_ += bytes.substr(0, taken);
-    bytes.remove_prefix(taken);
-    if (rest_.size() < block_size) return;
-    add_block(rest_.data());
-    rest_.clear();
-  }
-  for (; bytes.size() >= block_size; bytes.remove_prefix(block_size)) add_block(bytes.data());
-  rest_ += bytes;
-}
+void Sha256::Free::operator()(evp_md_ctx_st* context) const { EVP_MD_CTX_free(context); }
+
+Sha256::Sha256() : context_(EVP_MD_CTX_new()) { check(EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr)); }
+
+void Sha256::add(std::string_view bytes) { check(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size())); }
 
 std::string Sha256::digest() {
-  const std::uint64_t bits = 8 * bytes_;
-  std::string end(1, '\x80');
-  end.append((2 * block_size - 9 - rest_.size()) % block_size, '\0');
-  for (int shift = 56; shift >= 0; shift -= 8) end += static_cast<char>(bits >> shift & 255);
-  add(end);
+  std::array<unsigned char, 32> bytes{};
+  check(EVP_DigestFinal_ex(context_.get(), bytes.data(), nullptr));
   std::string text;
-  for (const std::uint32_t word : state_) text += fmt::format("{:08x}", word);
+  for (const unsigned char byte : bytes) text += fmt::format("{:02x}", byte);
   return text;
-}
-
-// FIPS 180-4, 6.2.2.
-void Sha256::add_block(const char* bytes) {
-  std::array<std::uint32_t, 64> w{};
-  for (size_t t = 0; t < 16; ++t) w[t] = big_endian(bytes + 4 * t);
-  for (size_t t = 16; t < 64; ++t) {
-    const std::uint32_t s0 = std::rotr(w[t - 15], 7) ^ std::rotr(w[t - 15], 18) ^ w[t - 15] >> 3;
-    const std::uint32_t s1 = std::rotr(w[t - 2], 17) ^ std::rotr(w[t - 2], 19) ^ w[t - 2] >> 10;
-    w[t] = w[t - 16] + s0 + w[t - 7] + s1;
-  }
-  auto [a, b, c, d, e, f, g, h] = state_;
-  for (size_t t = 0; t < 64; ++t) {
-    const std::uint32_t S1 = std::rotr(e, 6) ^ std::rotr(e, 11) ^ std::rotr(e, 25);
-    const std::uint32_t t1 = h + S1 + ((e & f) ^ (~e & g)) + constants[t] + w[t];
-    const std::uint32_t S0 = std::rotr(a, 2) ^ std::rotr(a, 13) ^ std::rotr(a, 22);
-    const std::uint32_t t2 = S0 + ((a & b) ^ (a & c) ^ (b & c));
-    h = g, g = f, f = e, e = d + t1;
-    d = c, c = b, b = a, a = t1 + t2;
-  }
-  const std::array<std::uint32_t, 8> sum = {a, b, c, d, e, f, g, h};
-  for (size_t i = 0; i < 8; ++i) state_[i] += sum[i];
 }
 
 std::string sha256(std::string_view bytes) {

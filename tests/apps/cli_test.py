@@ -134,7 +134,8 @@ class Usage(Case):
         lines = result.stdout.splitlines()
         for name, licence in (("Eigen", "MPL"), ("CHOLMOD", "GPL"), ("ARPACK", "BSD"), ("Spectra", "MPL"),
                               ("SUNDIALS", "BSD"), ("CLI11", "BSD"), ("toml++", "MIT"), ("nlohmann-json", "MIT"),
-                              ("fmt", "MIT"), ("METIS", "Apache"), ("BLAS", "BSD"), ("AMD", "BSD"), ("GNU", "GPL")):
+                              ("fmt", "MIT"), ("METIS", "Apache"), ("BLAS", "BSD"), ("AMD", "BSD"), ("GNU", "GPL"),
+                              ("LAPACKE", "BSD"), ("OpenSSL", "Apache")):
             self.assertTrue(any(name in line and licence in line for line in lines), name)
         self.assertRegex(result.stdout, r"supernodal.*binary.*GPL")
 
