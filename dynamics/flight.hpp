@@ -1,16 +1,23 @@
 #pragma once
 
+#include "fem/stopwatch.hpp"
+
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <vector>
 
 namespace flexboom {
 
 /// How a stop was met so far: what settling is judged by, and what a flight that goes on must know.
 struct StopHistory {
-  double largest_rate = 0;  // of its hinge or joint [rad/s] or [m/s]
-  double settled = -1;      // time after which it was no longer looked at [s], or -1
+  double largest_rate = 0;       // of its hinge or joint [rad/s] or [m/s]
+  double largest_gap = 0;        // to either side of the stop [rad] or [m]
+  double settled = -1;           // time after which it was no longer looked at [s], or -1
+  std::optional<bool> closed{};  // at the end; unknown: as gap and rate are
 };
 
 /// What every flight is asked for, whatever the coordinates and the method.
@@ -32,6 +39,40 @@ struct FlightOptions {
   long max_steps = 200'000'000;
   const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
   std::function<void(double time, double duration)> progress;  // called now and then
+  double checkpoint_every = 10;                                // wall time between two checkpoints [s]
+};
+
+/// Called at the start of a flight, now and then, and where it fails: with what the flight would return if it were
+/// interrupted there. The first `outputs` rows stay; a row behind them is the state there.
+template <class Trajectory>
+using Checkpoint = std::function<void(const Trajectory& so_far, std::size_t outputs)>;
+
+/// When the next checkpoint is due. None changes a flight: they come by the clock.
+class CheckpointClock {
+ public:
+  explicit CheckpointClock(const FlightOptions& o) : every_(o.checkpoint_every) {}
+  bool due() const { return since_.seconds() >= every_; }
+  void restart() { since_ = Stopwatch(); }
+
+ private:
+  double every_;
+  Stopwatch since_;
+};
+
+/// How fast a hinge or joint was since it last crossed its stop. Bounces lose a part of that each. A motion that only
+/// decays loses all of it: what it crosses the stop with is round-off or the method's error, and no contact.
+class Approach {
+ public:
+  /// `spring`: its frequency off the stop [rad/s], by which a gap counts as a rate.
+  void observe(double gap, double rate, double spring) {
+    largest_ = std::max({largest_, std::abs(rate), std::abs(gap) * spring});
+  }
+  void restart(double rate) { largest_ = std::abs(rate); }
+  bool has_decayed(double rate) const { return std::abs(rate) < 1e-3 * largest_; }
+  double round_off() const { return 1e-14 * largest_; }
+
+ private:
+  double largest_ = 0;  // [rad/s] or [m/s]
 };
 
 /// @throws InputError naming the option that makes no sense; `stops`: how many histories there may be.

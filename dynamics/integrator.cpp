@@ -63,6 +63,13 @@ class Scales {
     });
   }
 
+  /// Errors of a gap are weighed against no less than this.
+  void raise_gap(int hinge, double size) {
+    const int i = system_.layout().body[static_cast<size_t>(hinge)];
+    largest_[i] = std::max(largest_[i], size);
+    error_.scale[i] = std::max(error_.scale[i], size);
+  }
+
   /// Forgets the past of the hinges when asked to measure their error against recent motion.
   void restart(const VectorXd& y) {
     if (!rescale_) return;
@@ -176,7 +183,8 @@ Contacts contacts_at_start(const System& system, const VectorXd& y, const Integr
     const double gap = system.gap(y.data(), hinge), rate = system.gap_rate(y.data(), hinge);
     const double push = system.gap_rate(y_dot.data(), hinge);
     c.armed[i] = system.appendages()[i].hinge.mechanism.stop_stiffness > 0 && c.history[i].settled < 0;
-    c.closed[i] = c.armed[i] && (gap > 0 || (gap == 0 && (rate > 0 || (rate == 0 && push > 0))));
+    c.closed[i] =
+        c.armed[i] && c.history[i].closed.value_or(gap > 0 || (gap == 0 && (rate > 0 || (rate == 0 && push > 0))));
   }
   return c;
 }
@@ -184,9 +192,12 @@ Contacts contacts_at_start(const System& system, const VectorXd& y, const Integr
 /// One run: the event loop around a method.
 class Flight {
  public:
-  Flight(const System& system, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method)
+  Flight(const System& system, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method,
+         const Checkpoint<Trajectory>& so_far)
       : system_(system),
         options_(options),
+        so_far_(so_far),
+        clock_(options),
         settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
         scales_(system, y0, method.local_share * options.tolerance, options.rescale_at_events),
         stepper_(method.make_of_system ? method.make_of_system(system, scales_.error())
@@ -195,18 +206,37 @@ class Flight {
         outputs_(options),
         t_(options.start),
         y_(y0),
+        next_y_(y0),
         y_dot_(y0.size()),
         samples_(y0.size(), 16),
         work_(system.workspace()),
-        crossed_(contacts_.closed.size(), 0) {}
+        crossed_(contacts_.closed.size(), 0),
+        approach_(crossed_.size()),
+        asleep_(crossed_.size(), 0.0) {
+    for (size_t i = 0; i < crossed_.size(); ++i) {
+      const int hinge = static_cast<int>(i);
+      approach_[i].observe(system.gap(y0.data(), hinge), system.gap_rate(y0.data(), hinge), spring_rate(i));
+    }
+    if (options.rescale_at_events) return;
+    for (size_t i = 0; i < crossed_.size(); ++i)
+      scales_.raise_gap(static_cast<int>(i), contacts_.history[i].largest_gap);
+  }
 
   Trajectory fly() {
-    const Stopwatch start;
     record(t_, y_);
-    stepper_->restart(t_, y_, contacts_.closed, contacts_.armed);
-    stepper_->foresee(options_.duration, [this](const VectorXd& y) { scales_.foresee(y); });
-    while (t_ < options_.duration && !stopped()) advance();
-    finish(start.seconds());
+    checkpoint();
+    try {
+      stepper_->restart(t_, y_, contacts_.closed, contacts_.armed);
+      stepper_->foresee(options_.duration, [this](const VectorXd& y) { scales_.foresee(y); });
+      while (t_ < options_.duration && !stopped()) {
+        advance();
+        if (clock_.due()) checkpoint();
+      }
+    } catch (const NumericalError&) {
+      checkpoint();
+      throw;
+    }
+    finish();
     return std::move(result_);
   }
 
@@ -217,12 +247,29 @@ class Flight {
     return stop;
   }
 
+  /// What an interruption here would leave.
+  void checkpoint() {
+    if (so_far_) {
+      const size_t outputs = result_.time.size();
+      const IntegrationSummary before = result_.summary;
+      result_.summary.interrupted = true;
+      finish();
+      so_far_(result_, outputs);
+      result_.summary = before;
+      result_.time.resize(outputs), result_.y.resize(outputs), result_.balance.resize(outputs);
+    }
+    clock_.restart();
+  }
+
   void advance() {
-    stepper_->step(options_.duration, t_, y_, crossed_);
+    double next_t = t_;
+    next_y_ = y_;
+    stepper_->step(options_.duration, next_t, next_y_, crossed_);
     if (++steps_ > options_.max_steps)
       throw NumericalError(
-          fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t_, options_.duration));
-    if (!y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", t_));
+          fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, next_t, options_.duration));
+    if (!next_y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", next_t));
+    t_ = next_t, y_.swap(next_y_);
     write_outputs();
     scales_.observe(y_);
     if (switch_contacts()) {
@@ -273,23 +320,48 @@ class Flight {
     for (size_t i = 0; i < crossed_.size(); ++i) {
       const int hinge = static_cast<int>(i);
       const double rate = system_.gap_rate(y_.data(), hinge);
-      double& largest = contacts_.history[i].largest_rate;
+      double &largest = contacts_.history[i].largest_rate, &reach = contacts_.history[i].largest_gap;
       largest = std::max(largest, std::abs(rate));
+      reach = std::max(reach, std::abs(system_.gap(y_.data(), hinge)));
       const bool slipped = slipped_through(i);
-      if (crossed_[i] != 0 || slipped) {
+      if ((crossed_[i] != 0 || slipped) && has_decayed(i, rate)) {
+        settle(i);
+        changed = true;
+      } else if (crossed_[i] != 0 || slipped) {
         double& gap = y_[system_.layout().body[i]];
         const bool contact = slipped ? gap > 0 : crossed_[i] > 0;
         if (!slipped) gap = 0;  // on the stop, exactly: the root is good to round-off of t
         contacts_.closed[i] = contact;
         result_.events.push_back({t_, hinge, contact, rate});
         changed = true;
-        if (std::abs(rate) < settle_ * largest && !pushed(i)) settle(i);
-      } else if (contacts_.history[i].settled >= 0 && std::abs(rate) > 2 * settle_ * largest) {
+        approach_[i].restart(rate);
+        if (std::abs(rate) < settle_ * largest && !pushed(i, settle_ * largest)) settle(i);
+      } else if (contacts_.history[i].settled >= 0 && std::abs(rate) > 2 * std::max(settle_ * largest, asleep_[i])) {
         wake(i);
         changed = true;
       }
+      approach_[i].observe(system_.gap(y_.data(), hinge), rate, spring_rate(i));
     }
     return changed;
+  }
+
+  /// Is a crossing at this rate but the end of a motion that has died out on its way to the stop?
+  bool has_decayed(size_t i, double rate) {
+    if (!approach_[i].has_decayed(rate)) return false;
+    const ErrorScale& error = scales_.error();
+    const Layout& l = system_.layout();
+    const double noise = error.tolerance * error.scale[l.p + l.base + l.body[i]];
+    asleep_[i] = std::max({settle_ * contacts_.history[i].largest_rate, approach_[i].round_off(), noise});
+    if (!(std::abs(rate) < asleep_[i])) return false;
+    // Stiff modes make a push of what the method's error leaves open of them.
+    const double here = push(i, y_), beside = push(i, y_ + error.tolerance * error.scale);
+    return std::abs(here) <= 2 * asleep_[i] + std::abs(beside - here);
+  }
+
+  /// Of a rigid boom off its stop [rad/s].
+  double spring_rate(size_t i) const {
+    const Appendage& a = system_.appendages()[i];
+    return std::sqrt(a.hinge.mechanism.stiffness / a.body.J0(2, 2));
   }
 
   /// Is the gap on the wrong side of the flag, with no crossing found? A root finder sees no sign change where the gap
@@ -303,12 +375,14 @@ class Flight {
 
   /// Does something push a hinge that is on its stop, so that it will not stay there? A boom that is pressed against
   /// its stop swings in it, and comes back to where the stop begins with no rate left.
-  bool pushed(size_t i) {
-    system_.derivative(t_, y_.data(), contacts_.closed, *work_, y_dot_.data());
+  bool pushed(size_t i, double least_rate) { return std::abs(push(i, y_)) > 2 * least_rate; }
+
+  /// What pushes a hinge, as the rate that it gives within its period on the stop.
+  double push(size_t i, const VectorXd& y) {
+    system_.derivative(t_, y.data(), contacts_.closed, *work_, y_dot_.data());
     const Appendage& a = system_.appendages()[i];
     const double period = std::sqrt(a.body.J0(2, 2) / (a.hinge.mechanism.stiffness + a.hinge.mechanism.stop_stiffness));
-    const double push = system_.gap_rate(y_dot_.data(), static_cast<int>(i));
-    return std::abs(push) * period > 2 * settle_ * contacts_.history[i].largest_rate;
+    return period * system_.gap_rate(y_dot_.data(), static_cast<int>(i));
   }
 
   void settle(size_t i) {
@@ -319,11 +393,12 @@ class Flight {
 
   void wake(size_t i) {
     contacts_.history[i].settled = -1;
+    asleep_[i] = 0;
     contacts_.armed[i] = 1;
     contacts_.closed[i] = system_.gap(y_.data(), static_cast<int>(i)) > 0;
   }
 
-  void finish(double seconds) {
+  void finish() {
     IntegrationSummary& s = result_.summary;
     const StepCounts c = stepper_->counts();
     s.method = options_.method;
@@ -333,8 +408,9 @@ class Flight {
     s.factorisations = c.factorisations;
     s.newton_iterations = c.newton_iterations;
     s.error_test_failures = c.error_test_failures;
-    s.seconds = seconds;
+    s.seconds = watch_.seconds();
     s.stops = contacts_.history;
+    for (size_t i = 0; i < s.stops.size(); ++i) s.stops[i].closed = contacts_.closed[i] != 0;
     if (s.interrupted && result_.time.back() < t_) record(t_, y_);
     conservation(s);
   }
@@ -361,17 +437,22 @@ class Flight {
 
   const System& system_;
   const IntegratorOptions& options_;
+  const Checkpoint<Trajectory>& so_far_;
+  CheckpointClock clock_;
+  Stopwatch watch_;
   double settle_;
   Scales scales_;
   std::unique_ptr<Stepper> stepper_;
   Contacts contacts_;
   OutputTimes outputs_;
   double t_;
-  VectorXd y_, y_dot_;
+  VectorXd y_, next_y_, y_dot_;
   std::vector<double> times_;  // of outputs within a step, and their states
   Eigen::MatrixXd samples_;
   WorkspaceHandle work_;
   std::vector<int> crossed_;
+  std::vector<Approach> approach_;
+  std::vector<double> asleep_;  // rates below this do not wake a hinge that has settled on its way [rad/s]
   long steps_ = 0;
   Trajectory result_;
 };
@@ -399,11 +480,12 @@ const IntegratorMethod& integrator_method(const std::string& name, MethodFor wan
                                wanted == MethodFor::any ? " for trees" : "", known));
 }
 
-Trajectory integrate(const System& system, const VectorXd& y0, const IntegratorOptions& options) {
+Trajectory integrate(const System& system, const VectorXd& y0, const IntegratorOptions& options,
+                     const Checkpoint<Trajectory>& so_far) {
   check_options(options, system.appendages().size());
   require(y0.size() == system.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   if (system.field()) system.field()->orbit.at(options.duration);  // does it last so long?
-  return Flight(system, y0, options, integrator_method(options.method, MethodFor::system)).fly();
+  return Flight(system, y0, options, integrator_method(options.method, MethodFor::system), so_far).fly();
 }
 
 }  // namespace flexboom

@@ -60,7 +60,8 @@ struct Trajectory {
 /// Flies the system from y0 at the start.
 /// @throws InputError for an unknown method (listing those that exist) or bad options; NumericalError when the method
 /// fails.
-Trajectory integrate(const System&, const Eigen::VectorXd& y0, const IntegratorOptions&);
+Trajectory integrate(const System&, const Eigen::VectorXd& y0, const IntegratorOptions&,
+                     const Checkpoint<Trajectory>& = {});
 
 /// What a method needs to weigh an error: |error_i| is measured in units of tolerance * scale_i.
 struct ErrorScale {

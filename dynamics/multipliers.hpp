@@ -121,6 +121,6 @@ std::vector<BodyState> close_joints(const Multipliers&, std::vector<BodyState>, 
 /// @throws InputError when the start does not fulfil a joint (naming it) or the options are bad; NumericalError when
 /// the method fails or a loop locks, naming the joint.
 MultibodyTrajectory integrate_multipliers(const Multipliers&, const std::vector<BodyState>& start,
-                                          const MultipliersOptions&);
+                                          const MultipliersOptions&, const Checkpoint<MultibodyTrajectory>& = {});
 
 }  // namespace flexboom

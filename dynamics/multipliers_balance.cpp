@@ -44,13 +44,13 @@ Balance balance_of(const Equations& equations, const VectorXd& y, const JointMem
   return b;
 }
 
-bool is_isolated(const Multibody& scene) {
-  if (!scene.loads.empty() || !scene.gravity.isZero(0)) return false;
-  for (const Joint& j : scene.joints)
-    if (j.kind != JointKind::free && (j.a.body < 0 || j.b.body < 0)) return false;
-  return std::none_of(scene.springs.begin(), scene.springs.end(),
-                      [](const SpringDamper& s) { return s.a.body < 0 || s.b.body < 0; });
+bool is_held(const Multibody& scene) {
+  const auto grounded = [](const auto& pair) { return pair.a.body < 0 || pair.b.body < 0; };
+  return std::ranges::any_of(scene.joints, [&](const Joint& j) { return j.kind != JointKind::free && grounded(j); }) ||
+         std::ranges::any_of(scene.springs, grounded);
 }
+
+bool is_isolated(const Multibody& scene) { return scene.loads.empty() && scene.gravity.isZero(0) && !is_held(scene); }
 
 void set_drifts(const Multibody& scene, MultibodyTrajectory& r) {
   MultipliersSummary& s = r.summary;

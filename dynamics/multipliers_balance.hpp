@@ -9,6 +9,9 @@ namespace flexboom::redundant {
 /// Energies and momenta at y, those of wheels and of gravity too.
 Balance balance_of(const Equations&, const Eigen::VectorXd& y, const JointMemory&);
 
+/// Does something join bodies to the inertial frame?
+bool is_held(const Multibody&);
+
 /// Does nothing from outside push the bodies?
 bool is_isolated(const Multibody&);
 

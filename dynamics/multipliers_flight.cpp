@@ -2,6 +2,7 @@
 #include "dynamics/ida.hpp"
 #include "dynamics/multipliers.hpp"
 #include "dynamics/multipliers_balance.hpp"
+#include "dynamics/multipliers_frame.hpp"
 #include "dynamics/multipliers_scales.hpp"
 #include "dynamics/multipliers_start.hpp"
 #include "fem/check.hpp"
@@ -27,22 +28,26 @@ constexpr double open_joint = 1e-8;
 /// One run: the events around IDA.
 class MultipliersFlight final : public DaeProblem {
  public:
-  MultipliersFlight(const Multipliers& system, const std::vector<BodyState>& start, const MultipliersOptions& options)
+  MultipliersFlight(const Multipliers& system, const std::vector<BodyState>& start, const MultipliersOptions& options,
+                    const Checkpoint<MultibodyTrajectory>& so_far)
       : equations_(system.impl()),
         scene_(system.multibody()),
         options_(options),
+        so_far_(so_far),
+        clock_(options),
         outputs_(options),
         settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
         t_(options.start),
         history_(stops_at_start(options, scene_.joints.size())) {
     const size_t joints = scene_.joints.size();
     memory_ = {std::vector<char>(joints, 0), std::vector<double>(joints, 0.0)};
-    largest_gap_.assign(joints, 0);
     for (size_t i = 0; i < joints; ++i)
       if (equations_.joints()[i].stop) stops_.push_back(i);
     for (const size_t joint : stops_) armed_.push_back(history_[joint].settled < 0);
-    crossed_.assign(stops_.size(), 0);
-    start_on_constraints(start);
+    crossed_.assign(stops_.size(), 0), approach_.resize(stops_.size()), asleep_.assign(stops_.size(), 0.0);
+    check_sizes(start);
+    frame_ = std::make_unique<FlightFrame>(equations_, start, t_);
+    start_on_constraints(frame_->seen(start));
     begin_contacts();
     equations_.make_consistent(t_, y_, y_dot_, memory_);
     const Balance b = balance_of(equations_, y_, memory_);
@@ -53,12 +58,19 @@ class MultipliersFlight final : public DaeProblem {
   }
 
   MultibodyTrajectory fly() {
-    const Stopwatch watch;
     record(t_, y_);
-    ida_->restart(t_, y_, y_dot_);
-    while (t_ < options_.duration && !stopped()) advance();
-    if (result_.summary.interrupted && result_.time.back() < t_) record(t_, y_);
-    finish(watch.seconds());
+    checkpoint();
+    try {
+      ida_->restart(t_, y_, y_dot_);
+      while (t_ < options_.duration && !stopped()) {
+        advance();
+        if (clock_.due()) checkpoint();
+      }
+    } catch (const NumericalError&) {
+      checkpoint();
+      throw;
+    }
+    finish();
     return std::move(result_);
   }
 
@@ -95,7 +107,7 @@ class MultipliersFlight final : public DaeProblem {
     return equations_.gap(stops_[stop], y, memory_.near[stops_[stop]]);
   }
 
-  void start_on_constraints(const std::vector<BodyState>& start) {
+  void check_sizes(const std::vector<BodyState>& start) const {
     require(start.size() == scene_.bodies.size(),
             fmt::format("{} bodies need as many states, {} were given", scene_.bodies.size(), start.size()));
     for (size_t i = 0; i < start.size(); ++i)
@@ -103,6 +115,9 @@ class MultipliersFlight final : public DaeProblem {
         require(q->size() == 0 || q->size() == scene_.bodies[i].n(),
                 fmt::format("body \"{}\" has {} elastic coordinates, {} were given", scene_.bodies[i].name,
                             scene_.bodies[i].n(), q->size()));
+  }
+
+  void start_on_constraints(const std::vector<BodyState>& start) {
     y_ = equations_.pack(start);
     require(y_.allFinite(), "the start state is not finite");
     Equations::RowValues values;
@@ -123,7 +138,7 @@ class MultipliersFlight final : public DaeProblem {
   }
 
   void require_closed(const Violation& v, const char* metres, const char* radians, const char* what) const {
-    const bool place = v.position > open_joint;
+    const bool place = v.position > open_joint + frame_->round_off();
     if (!place && !(v.angle > open_joint)) return;
     throw InputError(fmt::format("{}: it {} {:.3g} {} at the start; see close_joints",
                                  describe(equations_, place ? v.worst_position : v.worst_angle), what,
@@ -143,8 +158,10 @@ class MultipliersFlight final : public DaeProblem {
     for (size_t i = 0; i < stops_.size(); ++i) {
       const DriveMotion<double> g = gap(i, y_.data());
       const double push = rate_of_rate(i, y);
+      approach_[i].observe(g.value, g.rate, spring_rate(i));
       const bool on = std::abs(g.value) < 4e-16;
-      memory_.closed[stops_[i]] = armed_[i] && (on ? g.rate > 0 || (g.rate == 0 && push > 0) : g.value > 0);
+      const bool beyond = on ? g.rate > 0 || (g.rate == 0 && push > 0) : g.value > 0;
+      memory_.closed[stops_[i]] = armed_[i] && history_[stops_[i]].closed.value_or(beyond);
     }
   }
 
@@ -173,10 +190,46 @@ class MultipliersFlight final : public DaeProblem {
     return stop;
   }
 
+  /// What an interruption here would leave.
+  void checkpoint() {
+    if (so_far_) {
+      const size_t outputs = result_.time.size();
+      const MultipliersSummary before = result_.summary;
+      result_.summary.interrupted = true;
+      finish();
+      so_far_(result_, outputs);
+      result_.summary = before;
+      result_.time.resize(outputs), result_.states.resize(outputs), result_.balance.resize(outputs);
+    }
+    clock_.restart();
+  }
+
+  /// One step, and what it met. Where it fails, state and outputs are those before.
   void advance() {
-    const double t0 = t_;
     before_.resize(stops_.size());
     for (size_t i = 0; i < stops_.size(); ++i) before_[i] = clearance(i, y_);
+    const double t0 = t_;
+    y_before_ = y_;
+    try {
+      step();
+    } catch (const NumericalError&) {
+      t_ = t0, y_.swap(y_before_);
+      throw;
+    }
+    write_outputs();
+    scales_->observe(y_);
+    follow_turns();
+    if (switch_contacts() || at_corner()) {
+      equations_.project(t_, y_);
+      equations_.make_consistent(t_, y_, y_dot_, memory_);
+      ida_->restart(t_, y_, y_dot_);
+      ++result_.summary.restarts;
+    }
+    if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
+  }
+
+  void step() {
+    const double t0 = t_;
     try {
       ida_->step(limit(), t_, y_, crossed_);
     } catch (const NumericalError& error) {
@@ -188,17 +241,7 @@ class MultipliersFlight final : public DaeProblem {
           fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t_, options_.duration));
     if (!y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", t_));
     if (std::all_of(crossed_.begin(), crossed_.end(), [](int c) { return c == 0; })) find_short_contacts(t0);
-    write_outputs();
-    scales_->observe(y_);
-    follow_turns();
     watch_constraints();
-    if (switch_contacts() || at_corner()) {
-      equations_.project(t_, y_);
-      equations_.make_consistent(t_, y_, y_dot_, memory_);
-      ida_->restart(t_, y_, y_dot_);
-      ++result_.summary.restarts;
-    }
-    if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
   }
 
   /// Where the next step must end at the latest. What is nearer than round-off is reached.
@@ -283,39 +326,63 @@ class MultipliersFlight final : public DaeProblem {
     for (size_t i = 0; i < stops_.size(); ++i) {
       const size_t joint = stops_[i];
       const DriveMotion<double> g = gap(i, y_.data());
-      double &largest = history_[joint].largest_rate, &reach = largest_gap_[joint];
+      double &largest = history_[joint].largest_rate, &reach = history_[joint].largest_gap;
       largest = std::max(largest, std::abs(g.rate));
       reach = std::max(reach, std::abs(g.value));
       const double noise = options_.tolerance * reach;
       const bool closed = memory_.closed[joint];
       const bool slipped = armed_[i] && crossed_[i] == 0 && (closed ? g.value < -noise : g.value > noise);
       // Only a crossing away from where the flag is counts: the state may lie a rounding error behind the stop.
-      if ((crossed_[i] != 0 && (closed ? g.rate < 0 : g.rate > 0)) || slipped) {
+      const bool crossed = (crossed_[i] != 0 && (closed ? g.rate < 0 : g.rate > 0)) || slipped;
+      if (crossed && has_decayed(i, g.rate)) {
+        settle(i);
+        changed = true;
+      } else if (crossed) {
         memory_.closed[joint] = !closed;
         result_.events.push_back({t_, static_cast<int>(joint), !closed, g.rate});
         changed = true;
-        if (std::abs(g.rate) * period(i) < small(i) && !pushed(i)) {
-          history_[joint].settled = t_;
-          armed_[i] = 0;
-          memory_.closed[joint] = 0;
-        }
-      } else if (!armed_[i] && (std::abs(g.rate) * period(i) > 2 * small(i) || g.value > 2 * small(i))) {
+        approach_[i].restart(g.rate);
+        if (std::abs(g.rate) * period(i) < small(i) && !pushed(i, small(i))) settle(i);
+      } else if (!armed_[i] && std::max(std::abs(g.rate) * period(i), g.value) > 2 * std::max(small(i), asleep_[i])) {
         history_[joint].settled = -1;
+        asleep_[i] = 0;
         armed_[i] = 1;
         memory_.closed[joint] = g.value > 0;
         changed = true;
       }
+      approach_[i].observe(g.value, g.rate, spring_rate(i));
     }
     return changed;
   }
 
-  /// Time scale of a joint on its stop [s].
-  double period(size_t i) const {
+  void settle(size_t i) {
+    history_[stops_[i]].settled = t_;
+    armed_[i] = 0;
+    memory_.closed[stops_[i]] = 0;
+  }
+
+  /// Is a crossing at this rate but the end of a motion that has died out on its way to the stop?
+  bool has_decayed(size_t i, double rate) {
+    if (!approach_[i].has_decayed(rate)) return false;
+    const double noise = local_share * options_.tolerance * history_[stops_[i]].largest_gap;
+    asleep_[i] = std::max({small(i), approach_[i].round_off() * period(i), noise});
+    return std::abs(rate) * period(i) < asleep_[i] && !pushed(i, asleep_[i]);
+  }
+
+  double inertia(size_t i) const {
     const Joint& joint = scene_.joints[stops_[i]];
     const ReducedBody& body = scene_.bodies[static_cast<size_t>(std::max(joint.b.body, 0))];
-    const double inertia = joint.kind == JointKind::hinge ? body.J0.trace() / 3 : body.m;
-    return std::sqrt(inertia / (joint.mechanism.stiffness + joint.mechanism.stop_stiffness));
+    return joint.kind == JointKind::hinge ? body.J0.trace() / 3 : body.m;
   }
+
+  /// Time scale of a joint on its stop [s].
+  double period(size_t i) const {
+    const HingeMechanism& m = scene_.joints[stops_[i]].mechanism;
+    return std::sqrt(inertia(i) / (m.stiffness + m.stop_stiffness));
+  }
+
+  /// Of a joint off its stop [rad/s].
+  double spring_rate(size_t i) const { return std::sqrt(scene_.joints[stops_[i]].mechanism.stiffness / inertia(i)); }
 
   /// Size of motions about the stop that are not followed: those the scene does not ask for, and round-off of the gap.
   double small(size_t i) const {
@@ -324,10 +391,10 @@ class MultipliersFlight final : public DaeProblem {
   }
 
   /// Does something push a joint that is on its stop, so that it will not stay there?
-  bool pushed(size_t i) {
+  bool pushed(size_t i, double least) {
     VectorXd y = y_;
     equations_.make_consistent(t_, y, y_dot_, memory_);
-    return std::abs(rate_of_rate(i, y)) * period(i) * period(i) > 2 * small(i);
+    return std::abs(rate_of_rate(i, y)) * period(i) * period(i) > 2 * least;
   }
 
   void write_outputs() {
@@ -365,25 +432,32 @@ class MultipliersFlight final : public DaeProblem {
       s.spin.push_back(y[equations_.wheel(i)] / w.inertia - w.axis.dot(s.bodies[static_cast<size_t>(w.body)].omega));
     }
     s.work = y[equations_.work()], s.dissipated = y[equations_.dissipated()];
+    Balance balance = balance_of(equations_, y, memory_);
+    frame_->leave(t, s, balance);
     result_.time.push_back(t);
     result_.states.push_back(std::move(s));
-    result_.balance.push_back(balance_of(equations_, y, memory_));
+    result_.balance.push_back(balance);
   }
 
-  void finish(double seconds) {
+  void finish() {
     MultipliersSummary& s = result_.summary;
+    if (s.interrupted && result_.time.back() < t_) record(t_, y_);
     const DaeCounts c = ida_->counts();
     s.steps = c.steps, s.residual_evaluations = c.residual_evaluations, s.factorisations = c.factorisations;
     s.newton_iterations = c.newton_iterations, s.error_test_failures = c.error_test_failures;
     s.convergence_failures = c.convergence_failures;
-    s.seconds = seconds;
+    s.seconds = watch_.seconds();
     s.stops = history_;
+    for (const size_t joint : stops_) s.stops[joint].closed = memory_.closed[joint] != 0;
     set_drifts(scene_, result_);
   }
 
   Equations equations_;
   const Multibody& scene_;
   const MultipliersOptions& options_;
+  const Checkpoint<MultibodyTrajectory>& so_far_;
+  CheckpointClock clock_;
+  Stopwatch watch_;
   OutputTimes outputs_;
   double settle_, margin_ = 1, t_;
   std::vector<StopHistory> history_;  // per joint
@@ -391,10 +465,12 @@ class MultipliersFlight final : public DaeProblem {
   std::vector<size_t> stops_;  // joints with a stop
   std::vector<char> armed_;    // per stop
   std::vector<int> crossed_;
+  std::vector<Approach> approach_;  // per stop
+  std::vector<double> asleep_;      // motions below this do not wake a joint that has settled on its way [rad] or [m]
   std::vector<Clearance> before_;
-  std::vector<double> largest_gap_;
-  VectorXd y_, y_dot_, sample_, rows_, rates_;
+  VectorXd y_, y_before_, y_dot_, sample_, rows_, rates_;
   redundant::Assembly assembly_;
+  std::unique_ptr<FlightFrame> frame_;
   std::unique_ptr<StateScales> scales_;
   std::unique_ptr<Ida> ida_;
   long steps_ = 0;
@@ -404,11 +480,12 @@ class MultipliersFlight final : public DaeProblem {
 }  // namespace
 
 MultibodyTrajectory integrate_multipliers(const Multipliers& system, const std::vector<BodyState>& start,
-                                          const MultipliersOptions& options) {
+                                          const MultipliersOptions& options,
+                                          const Checkpoint<MultibodyTrajectory>& so_far) {
   check_options(options, system.multibody().joints.size());
   require(options.angles.empty() || options.angles.size() == system.multibody().joints.size(),
           "one angle per joint is needed");
-  return MultipliersFlight(system, start, options).fly();
+  return MultipliersFlight(system, start, options, so_far).fly();
 }
 
 }  // namespace flexboom

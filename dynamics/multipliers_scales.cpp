@@ -38,15 +38,15 @@ double slow_energy(const Multibody& scene) {
 StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorXd& y0_dot, double energy,
                          double tolerance, double duration)
     : equations_(equations), tolerance_(tolerance), start_(y0) {
-  constexpr double part = 1e-3, round_off = 4e-15;
+  constexpr double part = 1e-3;
   scale_ = VectorXd::Constant(y0.size(), 1e100);
   least_ = VectorXd::Zero(y0.size());
   const double time = std::min(1.0, 0.01 * duration), E = energy_scale(equations, energy, y0_dot, time);
   const auto& places = equations.places();
-  double length = 0;  // [m]: positions are known to round-off of this
-  for (const BodyPlaces& at : places) length = std::max(length, y0.segment<3>(at.R).norm());
   for (const JointData& j : equations.joints())
-    for (const PlaceData* p : {&j.a, &j.b}) length = std::max(length, std::sqrt(dot(p->position, p->position)));
+    for (const PlaceData* p : {&j.a, &j.b}) length_ = std::max(length_, std::sqrt(dot(p->position, p->position)));
+  for (const BodyPlaces& at : places) length_ = std::max(length_, y0.segment<3>(at.R).norm());
+  set_least();
   for (size_t i = 0; i < places.size(); ++i) {
     const BodyPlaces& at = places[i];
     const ReducedBody& b = equations.scene().bodies[i];
@@ -59,13 +59,7 @@ StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorX
     scale_.segment<3>(at.w).setConstant(w);
     scale_.segment<3>(at.R).setConstant(v * time);
     scale_.segment<4>(at.p).setConstant(std::min(part, w * time));
-    least_.segment<3>(at.R).setConstant(round_off * length);
-    least_.segment<4>(at.p).setConstant(round_off);
     for (int k = 0; k < at.n; ++k) {
-      // Where joints hold a body at places known to round-off, that is how well they know what it stretches by.
-      double shape = 0;
-      for (const Marker& m : b.markers) shape = std::max(shape, m.S.col(k).norm());
-      if (shape > 0) least_[at.q + k] = round_off * length / shape;
       const double u = speed(at.u + k, 1, b.Me(k, k));
       scale_[at.u + k] = u;
       scale_[at.q + k] =
@@ -81,11 +75,32 @@ StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorX
   observe(y0);
 }
 
+/// Where joints hold a body at places known to round-off, that is how well they know what it stretches by.
+void StateScales::set_least() {
+  constexpr double round_off = 4e-15;
+  for (size_t i = 0; i < equations_.places().size(); ++i) {
+    const BodyPlaces& at = equations_.places()[i];
+    least_.segment<3>(at.R).setConstant(round_off * length_);
+    least_.segment<4>(at.p).setConstant(round_off);
+    for (int k = 0; k < at.n; ++k) {
+      double shape = 0;
+      for (const Marker& m : equations_.scene().bodies[i].markers) shape = std::max(shape, m.S.col(k).norm());
+      if (shape > 0) least_[at.q + k] = round_off * length_ / shape;
+    }
+  }
+}
+
 void StateScales::raise(int first, int count, double size) {
   for (int k = 0; k < count; ++k) scale_[first + k] = std::max(scale_[first + k], size);
 }
 
 void StateScales::observe(const VectorXd& y) {
+  double length = 0;
+  for (const BodyPlaces& at : equations_.places()) length = std::max(length, y.segment<3>(at.R).norm());
+  if (length > 2 * length_) {
+    length_ = length;
+    set_least();
+  }
   for (const BodyPlaces& at : equations_.places()) {
     raise(at.R, 3, (y.segment<3>(at.R) - start_.segment<3>(at.R)).norm());
     Vector4d back = start_.segment<4>(at.p);

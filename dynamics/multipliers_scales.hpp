@@ -25,9 +25,10 @@ class StateScales {
 
  private:
   void raise(int first, int count, double size);
+  void set_least();
 
   const Equations& equations_;
-  double tolerance_;
+  double tolerance_, length_ = 0;          // positions are known to round-off of this [m]
   Eigen::VectorXd start_, scale_, least_;  // least: some round-off, or Newton can not converge
 };
 

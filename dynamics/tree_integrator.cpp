@@ -62,6 +62,9 @@ class TreeScales {
     for (int i = l.dissipated; i < l.size; ++i) error_.scale[i] = std::max(error_.scale[i], std::abs(y[i]));
   }
 
+  /// Errors of a state are weighed against no less than this.
+  void raise(int state, double size) { error_.scale[state] = std::max(error_.scale[state], size); }
+
  private:
   static constexpr double part = 1e-5;
   struct Group {
@@ -80,9 +83,12 @@ const IntegratorMethod& method_of(const IntegratorOptions& options) {
 /// One run: the event loop around a method.
 class TreeFlight {
  public:
-  TreeFlight(const Tree& tree, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method)
+  TreeFlight(const Tree& tree, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method,
+             const Checkpoint<TreeTrajectory>& so_far)
       : tree_(tree),
         options_(options),
+        so_far_(so_far),
+        clock_(options),
         settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
         scales_(tree, y0, method.local_share * options.tolerance),
         outputs_(options),
@@ -91,20 +97,30 @@ class TreeFlight {
         history_(stops_at_start(options, tree.scene().joints.size())),
         t_(options.start),
         y_(y0),
+        next_y_(y0),
         y_dot_(y0.size()) {
     const size_t stops = tree.stops().size();
-    closed_.assign(stops, 0), armed_.assign(stops, 1), crossed_.assign(stops, 0);
+    closed_.assign(stops, 0), armed_.assign(stops, 1), crossed_.assign(stops, 0), approach_.resize(stops);
     result_.summary.method = method.name;
     result_.stiffening_effect.assign(tree.scene().bodies.size(), 0.0);
+    for (const int joint : tree.stops()) scales_.raise(scalar(joint), history_[static_cast<size_t>(joint)].largest_gap);
     contacts_at_start();
   }
 
   TreeTrajectory fly() {
-    const Stopwatch start;
     record(t_, y_);
-    stepper_->restart(t_, y_, closed_, armed_);
-    while (t_ < options_.duration && !stopped()) advance();
-    finish(start.seconds());
+    checkpoint();
+    try {
+      stepper_->restart(t_, y_, closed_, armed_);
+      while (t_ < options_.duration && !stopped()) {
+        advance();
+        if (clock_.due()) checkpoint();
+      }
+    } catch (const NumericalError&) {
+      checkpoint();
+      throw;
+    }
+    finish();
     return std::move(result_);
   }
 
@@ -116,7 +132,9 @@ class TreeFlight {
       const double gap = ode_->gap(y_.data(), stop), rate = ode_->gap_rate(y_.data(), stop);
       const double push = ode_->gap_rate(y_dot_.data(), stop);
       armed_[i] = history(i).settled < 0;
-      closed_[i] = armed_[i] && (gap > 0 || (gap == 0 && (rate > 0 || (rate == 0 && push > 0))));
+      approach_[i].observe(gap, rate, spring_rate(i));
+      closed_[i] =
+          armed_[i] && history(i).closed.value_or(gap > 0 || (gap == 0 && (rate > 0 || (rate == 0 && push > 0))));
     }
   }
 
@@ -126,12 +144,31 @@ class TreeFlight {
     return stop;
   }
 
+  /// What an interruption here would leave.
+  void checkpoint() {
+    if (so_far_) {
+      const size_t outputs = result_.time.size();
+      const IntegrationSummary summary = result_.summary;
+      const std::vector<double> effect = result_.stiffening_effect;
+      result_.summary.interrupted = true;
+      finish();
+      so_far_(result_, outputs);
+      result_.summary = summary, result_.stiffening_effect = effect;
+      result_.time.resize(outputs), result_.y.resize(outputs), result_.balance.resize(outputs);
+      result_.warnings.clear();
+    }
+    clock_.restart();
+  }
+
   void advance() {
-    stepper_->step(limit(), t_, y_, crossed_);
+    double next_t = t_;
+    next_y_ = y_;
+    stepper_->step(limit(), next_t, next_y_, crossed_);
     if (++steps_ > options_.max_steps)
       throw NumericalError(
-          fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t_, options_.duration));
-    if (!y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", t_));
+          fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, next_t, options_.duration));
+    if (!next_y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", next_t));
+    t_ = next_t, y_.swap(next_y_);
     for (double next = output_time(); next <= t_; next = output_time()) {
       VectorXd sample = y_;
       if (next < t_) stepper_->interpolate(next, sample);
@@ -188,18 +225,20 @@ class TreeFlight {
       const int joint = tree_.stops()[i];
       const double rate = tree_.gap_rate(y_.data(), joint);
       history(i).largest_rate = std::max(history(i).largest_rate, std::abs(rate));
-      const bool slipped = slipped_through(i);
-      if (crossed_[i] != 0 || slipped) {
-        double& gap = y_[tree_.layout().joints[static_cast<size_t>(joint)].scalar];
+      history(i).largest_gap = std::max(history(i).largest_gap, std::abs(tree_.gap(y_.data(), joint)));
+      const bool slipped = slipped_through(i), crossed = crossed_[i] != 0 || slipped;
+      if (crossed && has_decayed(i, rate)) {
+        settle(i);
+        changed = true;
+      } else if (crossed) {
+        double& gap = y_[scalar(joint)];
         const bool contact = slipped ? gap > 0 : crossed_[i] > 0;
         if (!slipped) gap = 0;  // on the stop, exactly: the root is good to round-off of t
         closed_[i] = contact;
         result_.events.push_back({t_, joint, contact, rate});
         changed = true;
-        if (std::abs(rate) * period(i) < small(i) && !pushed(i)) {
-          history(i).settled = t_;
-          armed_[i] = closed_[i] = 0;
-        }
+        approach_[i].restart(rate);
+        if (std::abs(rate) * period(i) < small(i) && !pushed(i)) settle(i);
       } else if (!armed_[i] &&
                  (std::abs(rate) * period(i) > 2 * small(i) || tree_.gap(y_.data(), joint) > 2 * small(i))) {
         history(i).settled = -1;
@@ -207,10 +246,17 @@ class TreeFlight {
         closed_[i] = tree_.gap(y_.data(), joint) > 0;
         changed = true;
       }
+      approach_[i].observe(tree_.gap(y_.data(), joint), rate, spring_rate(i));
     }
     return changed;
   }
 
+  void settle(size_t i) {
+    history(i).settled = t_;
+    armed_[i] = closed_[i] = 0;
+  }
+
+  int scalar(int joint) const { return tree_.layout().joints[static_cast<size_t>(joint)].scalar; }
   StopHistory& history(size_t stop) { return history_[static_cast<size_t>(tree_.stops()[stop])]; }
   const StopHistory& history(size_t stop) const { return history_[static_cast<size_t>(tree_.stops()[stop])]; }
 
@@ -224,7 +270,7 @@ class TreeFlight {
   /// What the method's error leaves open of a gap.
   double noise(size_t i) const {
     const ErrorScale& error = scales_.error();
-    return error.tolerance * error.scale[tree_.layout().joints[static_cast<size_t>(tree_.stops()[i])].scalar];
+    return error.tolerance * error.scale[scalar(tree_.stops()[i])];
   }
 
   /// Size of motions about the stop that are not followed: those the scene does not ask for, and those that are hardly
@@ -233,26 +279,46 @@ class TreeFlight {
 
   /// Time scale of a joint on its stop [s].
   double period(size_t i) const {
-    const Joint& joint = tree_.scene().joints[static_cast<size_t>(tree_.stops()[i])];
-    const ReducedBody& body = tree_.scene().bodies[static_cast<size_t>(joint.b.body)];
-    const double inertia = joint.kind == JointKind::slider ? body.m : body.J0.trace();
-    return std::sqrt(inertia / (joint.mechanism.stiffness + joint.mechanism.stop_stiffness));
+    const HingeMechanism& m = joint(i).mechanism;
+    return std::sqrt(inertia(i) / (m.stiffness + m.stop_stiffness));
+  }
+
+  /// Of a joint off its stop [rad/s].
+  double spring_rate(size_t i) const { return std::sqrt(joint(i).mechanism.stiffness / inertia(i)); }
+
+  const Joint& joint(size_t stop) const { return tree_.scene().joints[static_cast<size_t>(tree_.stops()[stop])]; }
+  double inertia(size_t stop) const {
+    const ReducedBody& body = tree_.scene().bodies[static_cast<size_t>(joint(stop).b.body)];
+    return joint(stop).kind == JointKind::slider ? body.m : body.J0.trace();
   }
 
   /// Does something push a joint that is on its stop, so that it will not stay there?
-  bool pushed(size_t i) {
-    ode_->derivative(t_, y_.data(), closed_, y_dot_.data());
-    return std::abs(ode_->gap_rate(y_dot_.data(), static_cast<int>(i))) * period(i) * period(i) > 2 * small(i);
+  bool pushed(size_t i) { return std::abs(push(i, y_)) > 2 * small(i); }
+
+  /// What pushes a joint, as the way that it goes within its period on the stop.
+  double push(size_t i, const VectorXd& y) {
+    ode_->derivative(t_, y.data(), closed_, y_dot_.data());
+    return period(i) * period(i) * ode_->gap_rate(y_dot_.data(), static_cast<int>(i));
   }
 
-  void finish(double seconds) {
+  /// Is a crossing at this rate but the end of a motion that has died out on its way to the stop?
+  bool has_decayed(size_t i, double rate) {
+    if (!approach_[i].has_decayed(rate) || !(std::abs(rate) * period(i) < small(i))) return false;
+    // Stiff modes make a push of what the method's error leaves open of them.
+    const ErrorScale& error = scales_.error();
+    const double here = push(i, y_), beside = push(i, y_ + error.tolerance * error.scale);
+    return std::abs(here) <= 2 * small(i) + std::abs(beside - here);
+  }
+
+  void finish() {
     IntegrationSummary& s = result_.summary;
     const StepCounts c = stepper_->counts();
     s.steps = c.steps, s.rhs_evaluations = c.rhs_evaluations, s.jacobian_evaluations = c.jacobian_evaluations;
     s.factorisations = c.factorisations, s.newton_iterations = c.newton_iterations;
     s.error_test_failures = c.error_test_failures;
-    s.seconds = seconds;
+    s.seconds = watch_.seconds();
     s.stops = history_;
+    for (size_t i = 0; i < closed_.size(); ++i) s.stops[static_cast<size_t>(tree_.stops()[i])].closed = closed_[i] != 0;
     if (s.interrupted && result_.time.back() < t_) record(t_, y_);
     conservation(s);
     warn();
@@ -294,6 +360,9 @@ class TreeFlight {
 
   const Tree& tree_;
   const IntegratorOptions& options_;
+  const Checkpoint<TreeTrajectory>& so_far_;
+  CheckpointClock clock_;
+  Stopwatch watch_;
   double settle_;
   TreeScales scales_;
   OutputTimes outputs_;
@@ -301,21 +370,23 @@ class TreeFlight {
   std::unique_ptr<Stepper> stepper_;
   std::vector<char> closed_, armed_;
   std::vector<int> crossed_;
+  std::vector<Approach> approach_;
   std::vector<StopHistory> history_;  // per joint
   double t_;
-  VectorXd y_, y_dot_;
+  VectorXd y_, next_y_, y_dot_;
   long steps_ = 0;
   TreeTrajectory result_;
 };
 
 }  // namespace
 
-TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o) {
+TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o,
+                         const Checkpoint<TreeTrajectory>& so_far) {
   check_options(o, tree.scene().joints.size());
   require(y0.size() == tree.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   VectorXd start = y0;
   tree.impose(o.start, start);
-  return TreeFlight(tree, start, o, method_of(o)).fly();
+  return TreeFlight(tree, start, o, method_of(o), so_far).fly();
 }
 
 std::vector<Stiffening> stiffening_where_it_counts(const Multibody& scene, const TreeState& state, double duration,

@@ -22,7 +22,8 @@ struct TreeTrajectory {
 /// `rescale_at_events` is not heard: errors are measured against the largest motion so far.
 /// A body whose geometric stiffness is off although its effect exceeds the tolerance is named in the warnings.
 /// @throws InputError for an unknown method or bad options; NumericalError when the method fails.
-TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const IntegratorOptions&);
+TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const IntegratorOptions&,
+                         const Checkpoint<TreeTrajectory>& = {});
 
 /// For each body: on where the geometric stiffness exceeds `tolerance` of Ke at the start or, at rest relative to them,
 /// under the prescribed motions until `duration` [s].

@@ -1,6 +1,8 @@
 #include "dynamics/multipliers.hpp"
+#include "dynamics/formulations.hpp"
 #include "dynamics/integrator.hpp"
 #include "dynamics/rotation.hpp"
+#include "dynamics/tree_integrator.hpp"
 
 #include "dynamics_testing.hpp"
 #include "fem/check.hpp"
@@ -239,6 +241,71 @@ struct Sport {
     return place_bodies(tree, {{}, angle, angle, angle, angle});
   }
 };
+
+// Joints hold at the distances and speeds of an orbit as they do at the origin, in as many steps.
+TEST(Multipliers, FarAndFastIsTheSameMotion) {
+  const Sport sport(1);
+  const MultipliersOptions o = testing::options(1e-8, 0.02, 0.002);
+  const Multipliers system(sport.scene);
+  const MultibodyTrajectory here = integrate_multipliers(system, sport.start(), o);
+  const Vector3d way(0.6, -0.64, 0.48);
+  for (const auto& [distance, speed] : {std::pair{1e4, 0.0}, {1e6, 0.0}, {0.0, 7.6e3}, {7e6, 7.6e3}}) {
+    std::vector<BodyState> start = sport.start();
+    for (BodyState& b : start) b.position += distance * way, b.velocity += speed * way.reverse();
+    const MultibodyTrajectory there = integrate_multipliers(system, start, o);
+    EXPECT_LT(there.summary.steps, 1.2 * here.summary.steps) << distance << " m, " << speed << " m/s";
+    EXPECT_EQ(there.events.size(), here.events.size());
+    const double far = distance + speed * o.duration, round_off = 1e-15 * far;
+    ASSERT_EQ(there.time, here.time);
+    for (size_t i = 0; i < here.states.size(); ++i) {
+      const MultibodyState &a = here.states[i], &b = there.states[i];
+      const Vector3d moved = distance * way + here.time[i] * speed * way.reverse();
+      for (size_t k = 0; k < a.bodies.size(); ++k) {
+        EXPECT_LT((b.bodies[k].position - moved - a.bodies[k].position).norm(), 1e-9 + round_off);
+        EXPECT_LT((b.bodies[k].velocity - speed * way.reverse() - a.bodies[k].velocity).norm(), 1e-7);
+        if (k > 0) EXPECT_LT((b.bodies[k].q - a.bodies[k].q).norm(), 1e-9 + 10 * round_off);
+      }
+      for (size_t k = 0; k < a.coordinate.size(); ++k) EXPECT_NEAR(b.coordinate[k], a.coordinate[k], 1e-8);
+    }
+    EXPECT_LT(there.summary.position_drift, 1e-12);
+    EXPECT_LT(there.summary.momentum_drift, 1e-9);
+    EXPECT_LT(there.summary.energy_balance, 1e-7);
+  }
+}
+
+// Energies and the work of a load are those of the outer frame, gravity's too.
+TEST(Multipliers, EnergiesOfAFastBodyAreThoseOfRelativeCoordinates) {
+  Multibody scene;
+  scene.bodies = {rigid_body("hub", 3, Vector3d(0.1, 0, 0), Vector3d(0.3, 0.4, 0.5).asDiagonal()),
+                  testing::bar("bar", 1, 0.6)};
+  scene.joints = {joint("hub", JointKind::free, at(-1), at(0)),
+                  joint("hinge", JointKind::hinge, at(0, {0.2, 0.1, 0}), at(1), {2, 0.3, 0.1, 0, 0})};
+  scene.gravity = {0, -9.81, 0.3};
+  Load thrust;
+  thrust.name = "thrust", thrust.at = at(0, {0.1, 0, 0.2});
+  thrust.force[0] = [](double t) { return 2 + t; };
+  scene.loads = {thrust};
+  const Tree tree(scene);
+  TreeState start = tree.at_rest();
+  start.joints[0].position = {1e4, -2e4, 3e4}, start.joints[0].velocity = {4e3, 3e3, -1e3};
+  start.joints[0].omega = {0.3, -0.2, 0.4};
+  IntegratorOptions of_tree;
+  of_tree.method = "adams", of_tree.tolerance = 1e-10, of_tree.duration = 2, of_tree.output_step = 0.2;
+  const VectorXd y0 = tree.pack(start);
+  const TreeTrajectory a = integrate(tree, y0, of_tree);
+  const Multipliers system(scene);
+  const MultibodyTrajectory b = integrate_multipliers(system, body_states(tree, 0, y0), testing::options(1e-9, 2, 0.2));
+  ASSERT_EQ(a.time.size(), b.time.size());
+  for (size_t i = 0; i < a.time.size(); ++i) {
+    const TreeBalance& e = a.balance[i];
+    EXPECT_NEAR(b.balance[i].kinetic, e.kinetic, 1e-12 * e.kinetic) << i;
+    EXPECT_NEAR(b.states[i].work, e.work, 1e-12 * e.kinetic) << i;
+    EXPECT_NEAR(b.balance[i].elastic, e.elastic + e.potential, 1e-12 * e.kinetic) << i;
+    EXPECT_NEAR(b.states[i].dissipated, e.dissipated, 1e-6) << i;
+    EXPECT_LT((b.balance[i].momentum - e.momentum).norm(), 1e-11 * e.momentum.norm()) << i;
+  }
+  EXPECT_LT(b.summary.energy_balance, 1e-12);
+}
 
 void expect_sport(double duration, const char* method, double tolerance, const char* linear_solver) {
   const Sport sport(2);
