@@ -4,6 +4,7 @@
 #include "apps/toml_writer.hpp"
 #include "apps/version.hpp"
 #include "fem/check.hpp"
+#include "reduction/sha256.hpp"
 
 #include <fmt/format.h>
 
@@ -26,7 +27,24 @@ using toml_writer::toml;
 
 namespace {
 
-constexpr std::string_view state_format = "flexboom-state-1";
+constexpr std::string_view state_format = "flexboom-state-2";
+constexpr std::string_view checksum_key = "sha256";
+
+/// The line that holds the checksum of all others, or an empty one behind the end.
+std::string_view checksum_line(std::string_view text) {
+  const std::string begin = fmt::format("\n{} = ", checksum_key);
+  const size_t at = text.find(begin);
+  if (at == std::string_view::npos) return text.substr(text.size());
+  return text.substr(at + 1, text.find('\n', at + 1) - at);
+}
+
+std::string checksum_of(std::string_view text) {
+  const std::string_view line = checksum_line(text);
+  Sha256 sum;
+  sum.add(text.substr(0, static_cast<size_t>(line.data() - text.data())));
+  sum.add(text.substr(static_cast<size_t>(line.data() + line.size() - text.data())));
+  return fmt::format("{} = \"{}\"\n", checksum_key, sum.digest());
+}
 
 /// Names by place.
 class Names {
@@ -112,6 +130,7 @@ std::string to_toml(const FlightState& state, const std::string& scene) {
   out.key("format", state_format);
   out.key("scene", scene);
   out.key("version", std::string_view(version));
+  out.key(checksum_key, std::string_view());
   out.key("time", state.time, "[s]");
   out.table("[modes]");
   for (const auto& [body, n] : state.modes) out.key(toml(body), n);
@@ -119,12 +138,19 @@ std::string to_toml(const FlightState& state, const std::string& scene) {
   for (size_t i = 0; i < state.names.size(); ++i) out.key(toml(state.names[i]), state.y[static_cast<Index>(i)]);
   out.table("[stops.largest_rate]");
   for (const auto& [name, stop] : state.stops) out.key(toml(name), stop.largest_rate);
+  out.table("[stops.largest_gap]");
+  for (const auto& [name, stop] : state.stops) out.key(toml(name), stop.largest_gap);
+  out.table("[stops.closed]");
+  for (const auto& [name, stop] : state.stops)
+    if (stop.closed) out.key(toml(name), *stop.closed);
   out.table("[stops.settled]");
   for (const auto& [name, stop] : state.stops)
     if (stop.settled >= 0) out.key(toml(name), stop.settled);
   out.table("[loops]");
   for (const auto& [joint, angle] : state.loops) out.key(toml(joint), angle);
-  return std::move(out).text();
+  std::string text = std::move(out).text();
+  const std::string_view line = checksum_line(text);
+  return text.replace(static_cast<size_t>(line.data() - text.data()), line.size(), checksum_of(text));
 }
 
 struct SavedState::Content {
@@ -182,17 +208,19 @@ std::map<std::string, double> numbers_of(TableReader& table, std::string_view ke
 
 }  // namespace
 
-SavedState SavedState::read(const fs::path& path) {
+SavedState SavedState::read(const fs::path& path, bool changed_too) {
   std::error_code error;
   auto content = std::make_unique<Content>();
   content->file = fs::is_directory(path, error) ? path / "state.toml" : path;
   const std::string file = content->file.string();
-  content->root = toml_reader::parse_format(toml_reader::read_text(file), file, state_format);
+  const std::string text = toml_reader::read_text(file);
+  content->root = toml_reader::parse_format(text, file, state_format);
   Faults faults;
   TableReader table(content->root, "", faults);
   read_format(table, state_format);
   table.text("scene");
   table.text("version");
+  table.text(checksum_key, "");
   content->time = table.number("time");
   if (!(content->time >= 0 && std::isfinite(content->time))) table.fault("time", "must be a time after the start [s]");
   if (std::optional<TableReader> modes = table.table("modes", true))
@@ -203,12 +231,19 @@ SavedState SavedState::read(const fs::path& path) {
   table.table("state", true);
   if (std::optional<TableReader> stops = table.table("stops", true)) {
     for (const auto& [name, rate] : numbers_of(*stops, "largest_rate")) content->stops[name].largest_rate = rate;
+    for (const auto& [name, gap] : numbers_of(*stops, "largest_gap")) content->stops[name].largest_gap = gap;
+    if (std::optional<TableReader> closed = stops->table("closed"))
+      for (const auto& [name, value] : closed->value().entries) content->stops[name].closed = closed->boolean(name);
     for (const auto& [name, time] : numbers_of(*stops, "settled")) content->stops[name].settled = time;
     stops->reject_unknown();
   }
   content->loops = numbers_of(table, "loops");
   table.reject_unknown();
   faults.throw_if_any();
+  const std::string_view line = checksum_line(text);
+  require(changed_too || line == checksum_of(text),
+          fmt::format("{}:{}:1: {}: the file was changed after it was written; --force goes on from it all the same",
+                      file, 1 + std::count(text.data(), line.data(), '\n'), checksum_key));
   return SavedState(std::move(content));
 }
 

@@ -29,13 +29,15 @@ struct FlightState {
 std::vector<std::string> state_names(const System&);
 std::vector<std::string> state_names(const Tree&);
 
+/// With a checksum of everything else in it.
 std::string to_toml(const FlightState&, const std::string& scene);
 
 /// A state that was read. Which numbers it must have is known when the scene is made.
 class SavedState {
  public:
-  /// The file, or `state.toml` of a folder. @throws InputError file:line:column for what is not such a file.
-  static SavedState read(const std::filesystem::path&);
+  /// The file, or `state.toml` of a folder. @throws InputError file:line:column for what is not such a file, and for
+  /// one that was changed after it was written, unless that is what is wanted.
+  static SavedState read(const std::filesystem::path&, bool changed_too = false);
   ~SavedState();
   SavedState(SavedState&&) noexcept;
 

@@ -74,6 +74,9 @@ struct CommandLine {
     c->add_option("--output-step", run.output_step, "Time between rows of trajectory.csv [s]");
     c->add_option("--vtu-step", run.vtu_step, "Time between .vtu files [s]; none by default");
     c->add_option("--continue", run.from, "Go on from the state that another run ended in: its results folder");
+    c->add_flag("--force", run.force, "Go on from a state that was changed by hand, too");
+    c->add_option("--checkpoint", run.checkpoint, "Wall time between two states on the disk [s]; 10 by default")
+        ->check(CLI::NonNegativeNumber);
     c->add_flag("--report", run.report, "Write report.html too");
     c->add_flag("--no-budget", run.no_budget, "Do not repeat the run to measure its errors");
     c->callback([this] { action = [this] { return run_command(run, common); }; });

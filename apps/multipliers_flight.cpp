@@ -93,14 +93,13 @@ void follow_turns(const TreeState& before, TreeState& s) {
     }
 }
 
-std::vector<TreeState> states_of(const Multipliers& system, const MultibodyTrajectory& flight) {
-  std::vector<TreeState> states;
-  for (const MultibodyState& m : flight.states) {
-    TreeState s = tree_state(system, m);
+/// Those of the rows that `states` does not have yet.
+void add_states(const Multipliers& system, const MultibodyTrajectory& flight, std::vector<TreeState>& states) {
+  while (states.size() < flight.states.size()) {
+    TreeState s = tree_state(system, flight.states[states.size()]);
     if (!states.empty()) follow_turns(states.back(), s);
     states.push_back(std::move(s));
   }
-  return states;
 }
 
 /// Energies as the tree has them: the potential of gravity apart, mechanisms of loops among the elastic ones.
@@ -156,6 +155,45 @@ void note_moved_starts(const Scene& scene, const TreeState& asked, const TreeSta
   }
 }
 
+/// A flight and its states in terms of the tree.
+struct FlownByMultipliers {
+  const Scene& scene;
+  const Multipliers& system;
+  const Tree& tree;
+  const MultibodyTrajectory& flight;
+  const std::vector<TreeState>& states;
+
+  VectorXd y(size_t row) const {
+    VectorXd y = tree.pack(without_loops(scene, states[row]));
+    y[tree.layout().dissipated_elsewhere] = flight.states[row].dissipated;
+    y[tree.layout().work] = flight.states[row].work;
+    return y;
+  }
+};
+
+/// What results are made of: the rows from `first` on that come before `last`, and where the flight is.
+void set_flown(const FlownByMultipliers& f, size_t first, size_t last, const std::vector<Stiffening>& stiffening,
+               Run& r) {
+  r.motion = {};
+  for (size_t row = first; row < last; ++row) {
+    r.motion.time.push_back(f.flight.time[row]);
+    r.motion.y.push_back(f.y(row));
+  }
+  r.outputs = tree_output_table(f.scene, f.tree, last - first, [&](size_t i) {
+    const size_t row = first + i;
+    return TreeMoment{f.flight.time[row], f.states[row], joint_loads(f.system, f.flight.states[row]),
+                      balance_of(f.tree, f.flight, row, r.motion.y[i])};
+  });
+  r.stiffening_left_out = largest_left_out(r.stiffening_effect, stiffening);
+  r.warnings = warnings_of(f.scene, f.flight, r.stiffening_effect, stiffening);
+  r.motion.events = events_of(f.flight.events, 0);
+  r.motion.summary = summary_of(f.flight.summary);
+  r.end = end_of(r, f.scene, f.flight.time.back(), f.y(f.states.size() - 1), r.motion.summary.stops);
+  for (size_t i = 0; i < f.scene.joints.size(); ++i)
+    if (f.scene.joints[i].closes_loop && f.scene.joints[i].kind == JointKind::hinge)
+      r.end.loops[f.scene.joints[i].name] = f.states.back().joints[i].coordinate[0];
+}
+
 }  // namespace
 
 Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
@@ -175,7 +213,24 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
   std::unique_ptr<const Multipliers> system;
   TreeState asked;
   MultibodyTrajectory flight;
-  do {
+  std::vector<TreeState> states;
+  size_t told = 0;
+  std::vector<double> effect;  // of the flight so far
+  Checkpoint<MultibodyTrajectory> checkpoint;
+  if (hooks.checkpoint)
+    checkpoint = [&](const MultibodyTrajectory& so_far, size_t outputs) {
+      effect = largest_stiffening(*system, so_far);
+      if (will_be_revised(scene, opened, effect, stiffening)) return;
+      add_states(*system, so_far, states);
+      Run part = r;
+      part.stiffening_effect = effect;
+      set_flown({scene, *system, *r.tree, so_far, states}, told, outputs, stiffening, part);
+      states.resize(outputs);
+      part.integrate_seconds = flight_time.seconds();
+      hooks.checkpoint(std::move(part), std::exchange(told, outputs));
+    };
+  const auto fly = [&] {
+    states.clear(), told = 0;
     r.tree = std::make_shared<const Tree>(opened, stiffening);
     VectorXd y0 = first_state(open, *r.tree);
     r.tree->impose(options.start, y0);
@@ -186,35 +241,21 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
     MultipliersOptions of_flight =
         multipliers_options(options, start_angles(system->multibody(), asked, scene.from.get()));
     set_energies(of_flight, r.tree->layout(), y0);
-    flight = integrate_multipliers(*system, closed, of_flight);
-    r.stiffening_effect = largest_stiffening(*system, flight);
-  } while (!flight.summary.interrupted && revise_stiffening(scene, opened, r.stiffening_effect, stiffening));
-  const std::vector<TreeState> states = states_of(*system, flight);
-  for (size_t row = 0; row < states.size(); ++row) {
-    VectorXd y = r.tree->pack(without_loops(scene, states[row]));
-    y[r.tree->layout().dissipated_elsewhere] = flight.states[row].dissipated;
-    y[r.tree->layout().work] = flight.states[row].work;
-    r.motion.y.push_back(std::move(y));
-  }
-  r.outputs = tree_output_table(scene, *r.tree, flight.time.size(), [&](size_t row) {
-    return TreeMoment{flight.time[row], states[row], joint_loads(*system, flight.states[row]),
-                      balance_of(*r.tree, flight, row, r.motion.y[row])};
-  });
-  r.stiffening_left_out = largest_left_out(r.stiffening_effect, stiffening);
+    flight = integrate_multipliers(*system, closed, of_flight, checkpoint);
+    effect = largest_stiffening(*system, flight);
+    return flight.summary.interrupted;
+  };
+  fly_until_settled(scene, opened, effect, stiffening, fly);
+  r.stiffening_effect = effect;
+  add_states(*system, flight, states);
+  set_flown({scene, *system, *r.tree, flight, states}, 0, states.size(), stiffening, r);
   note_moved_starts(scene, asked, states.front(), r.notes);
-  r.warnings = warnings_of(scene, flight, r.stiffening_effect, stiffening);
-  r.motion.time = std::move(flight.time);
-  r.motion.events = events_of(flight.events, 0);
-  r.motion.summary = summary_of(flight.summary);
   r.integrate_seconds = flight_time.seconds();
-  set_end(r, scene);
-  for (size_t i = 0; i < scene.joints.size(); ++i)
-    if (scene.joints[i].closes_loop && scene.joints[i].kind == JointKind::hinge)
-      r.end.loops[scene.joints[i].name] = states.back().joints[i].coordinate[0];
   return r;
 }
 
-Trajectory integrate_by_multipliers(const System& of_hub, const VectorXd& start, const IntegratorOptions& options) {
+Trajectory integrate_by_multipliers(const System& of_hub, const VectorXd& start, const IntegratorOptions& options,
+                                    const Checkpoint<Trajectory>& checkpoint) {
   const Multipliers system(multibody_of(of_hub));
   const Tree tree(multibody_of(of_hub));
   const Index motion = of_hub.layout().dissipated();  // up to here both have the same states
@@ -225,18 +266,27 @@ Trajectory integrate_by_multipliers(const System& of_hub, const VectorXd& start,
       multipliers_options(options, start_angles(system.multibody(), tree.unpack(y0), nullptr));
   of_flight.dissipated = start[motion];
   if (!options.stops.empty()) of_flight.stops.insert(of_flight.stops.begin(), static_cast<size_t>(first), {});
-  MultibodyTrajectory flight = integrate_multipliers(system, body_states(tree, options.start, y0), of_flight);
   Trajectory r;
-  for (const MultibodyState& s : flight.states) {
-    VectorXd y(of_hub.layout().size);
-    y << tree.pack(tree_state(system, s)).head(motion), s.dissipated;
-    r.y.push_back(std::move(y));
-  }
-  r.time = std::move(flight.time);
-  r.balance = std::move(flight.balance);
-  r.events = events_of(flight.events, first);
-  r.summary = summary_of(flight.summary);
-  r.summary.stops.erase(r.summary.stops.begin(), r.summary.stops.begin() + first);
+  const auto go_on = [&](const MultibodyTrajectory& flight) {
+    for (size_t row = r.time.size(); row < flight.time.size(); ++row) {
+      VectorXd y(of_hub.layout().size);
+      y << tree.pack(tree_state(system, flight.states[row])).head(motion), flight.states[row].dissipated;
+      r.y.push_back(std::move(y));
+      r.time.push_back(flight.time[row]);
+      r.balance.push_back(flight.balance[row]);
+    }
+    r.events = events_of(flight.events, first);
+    r.summary = summary_of(flight.summary);
+    r.summary.stops.erase(r.summary.stops.begin(), r.summary.stops.begin() + first);
+  };
+  Checkpoint<MultibodyTrajectory> on_the_way;
+  if (checkpoint)
+    on_the_way = [&](const MultibodyTrajectory& so_far, size_t outputs) {
+      go_on(so_far);
+      checkpoint(r, outputs);
+      r.time.resize(outputs), r.y.resize(outputs), r.balance.resize(outputs);
+    };
+  go_on(integrate_multipliers(system, body_states(tree, options.start, y0), of_flight, on_the_way));
   return r;
 }
 

@@ -14,6 +14,7 @@ Run fly_by_multipliers(const Scene&, std::vector<PreparedBody>, const RunHooks&,
 
 /// As `integrate` of a hub with hinged booms: the states are those of its System.
 /// @throws InputError, NumericalError.
-Trajectory integrate_by_multipliers(const System&, const Eigen::VectorXd& y0, const IntegratorOptions&);
+Trajectory integrate_by_multipliers(const System&, const Eigen::VectorXd& y0, const IntegratorOptions&,
+                                    const Checkpoint<Trajectory>& = {});
 
 }  // namespace flexboom

@@ -42,8 +42,11 @@ std::vector<std::string> split(const std::string& line) {
   return parts;
 }
 
-Table read_table(const fs::path& path) {
-  std::istringstream in(file_bytes(path));
+/// Of a run that was killed the last line may be a part of one: that is left out.
+Table read_table(const fs::path& path, bool whole) {
+  std::string text = file_bytes(path);
+  if (!whole) text.resize(text.rfind('\n') + 1);
+  std::istringstream in(text);
   std::string line;
   Table table;
   std::getline(in, line);
@@ -72,13 +75,28 @@ struct Folder {
 };
 
 Folder read_folder(const fs::path& folder) {
-  Folder f{read_scene(folder / "scene.toml"), read_table(folder / "trajectory.csv"), {}};
+  Folder f{read_scene(folder / "scene.toml"), {}, {}};
+  const fs::path summary = folder / "summary.json";
   try {
-    f.summary = json::parse(file_bytes(folder / "summary.json"));
+    f.summary = json::parse(file_bytes(summary));
+    const json& status = f.summary.at("status");
+    require(f.summary.contains("simulated_seconds"),
+            fmt::format("{}: this run has no rows: {}", summary.string(),
+                        f.summary.contains("error") ? f.summary["error"].dump() : status.dump()));
+    f.table = read_table(folder / "trajectory.csv", status != "running" && status != "failed");
   } catch (const json::exception& e) {
-    throw InputError(fmt::format("{}: {}", (folder / "summary.json").string(), e.what()));
+    throw InputError(fmt::format("{}: {}", summary.string(), e.what()));
   }
   return f;
+}
+
+/// What a reader must know before anything else.
+std::string status_line(const json& summary) {
+  const std::string status = summary.at("status").get<std::string>();
+  if (status == "finished") return "";
+  if (status == "running") return "<p><b>This run is under way, or was killed. Its last checkpoint is shown.</b></p>\n";
+  return fmt::format("<p><b>This run {}{}.</b></p>\n", status == "failed" ? "failed" : "was interrupted",
+                     summary.contains("error") ? ": " + escaped(summary["error"].get<std::string>()) : "");
 }
 
 Curve curve(const Table& table, const std::string& column, const std::string& name, double factor = 1,
@@ -236,6 +254,7 @@ std::string page(const Folder& f) {
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>flexboom: "
       "{0}</title>{1}</head><body>\n<h1>{0}</h1>\n",
       escaped(f.scene.name), style);
+  h += status_line(s);
   h += fmt::format("<p>{} s simulated in {} s ({} times real time), {} steps, {} contacts and releases.</p>\n",
                    cell(s.at("simulated_seconds")), cell(s.at("seconds").at("integrate")),
                    cell(s.at("real_time_factor")), cell(s.at("steps")), cell(s.at("events")));

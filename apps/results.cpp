@@ -11,8 +11,11 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 namespace flexboom {
 
@@ -31,24 +34,15 @@ void prepare_folder(const fs::path& folder) {
   fs::remove(probe, error);
 }
 
-void print_trajectory_csv(std::ostream& out, const OutputTable& table) {
+void print_rows(std::ostream& out, const OutputTable& table, size_t first) {
   fmt::memory_buffer line;
-  fmt::format_to(std::back_inserter(line), "{}\n", fmt::join(table.names, ","));
-  for (Eigen::Index row = 0; row < table.values.rows() && out; ++row) {
+  for (auto row = static_cast<Eigen::Index>(first); row < table.values.rows() && out; ++row) {
     for (Eigen::Index c = 0; c < table.values.cols(); ++c)
       fmt::format_to(std::back_inserter(line), "{:.17g}{}", table.values(row, c),
                      c + 1 < table.values.cols() ? ',' : '\n');
     out.write(line.data(), static_cast<std::streamsize>(line.size()));
     line.clear();
   }
-}
-
-std::string events_csv(const std::vector<std::string>& hinges, const Trajectory& motion) {
-  std::string out = "time,hinge,kind\n";
-  for (const Event& e : motion.events)
-    out +=
-        fmt::format("{:.17g},{},{}\n", e.time, hinges[static_cast<size_t>(e.hinge)], e.contact ? "contact" : "release");
-  return out;
 }
 
 namespace {
@@ -60,6 +54,21 @@ std::vector<std::string> hinge_names(const RunResult& r) {
   for (const PreparedBody& p : r.bodies) names.push_back(p.body.name);
   return names;
 }
+
+}  // namespace
+
+std::string event_rows(const RunResult& r, size_t first) {
+  const std::vector<std::string> hinges = hinge_names(r);
+  std::string out;
+  for (size_t i = first; i < r.trajectory.events.size(); ++i) {
+    const Event& e = r.trajectory.events[i];
+    out +=
+        fmt::format("{:.17g},{},{}\n", e.time, hinges[static_cast<size_t>(e.hinge)], e.contact ? "contact" : "release");
+  }
+  return out;
+}
+
+namespace {
 
 /// Is something from outside free to change the momenta?
 bool momenta_change(const Scene& scene) { return scene.is_tree ? !flies_freely(scene) : scene.hub.fixed; }
@@ -112,6 +121,7 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   ordered_json j;
   j["scene"] = r.scene.name;
   j["version"] = version;
+  j["status"] = s.interrupted ? "interrupted" : "finished";
   j["seconds"] = {{"prepare", r.prepare_seconds},
                   {"integrate", r.integrate_seconds},
                   {"write", write_seconds},
@@ -123,7 +133,7 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   j["factorisations"] = s.factorisations;
   j["events"] = r.trajectory.events.size();
   j["restarts"] = s.restarts;
-  const double simulated = r.trajectory.time.back() - r.trajectory.time.front();
+  const double simulated = r.end.time - (r.scene.from ? r.scene.from->time() : 0);
   j["real_time_factor"] = simulated / std::max(r.integrate_seconds, 1e-9);
   j["interrupted"] = s.interrupted;
   j["simulated_seconds"] = simulated;
@@ -199,41 +209,33 @@ VtkGrid grid_of(const Pose& pose, const System& system) {
 
 }  // namespace
 
-void write_frames(const RunResult& r, const fs::path& folder, const std::function<VtkGrid(size_t row)>& grid) {
-  std::vector<std::pair<double, std::string>> frames;
-  double next = 0;
+void MotionFrames::add(std::pair<double, std::string> frame, double vtu_step) {
+  const double t = frame.first;
+  if (vtu_step > 0) next += vtu_step * std::max(1.0, std::ceil((t - next) / vtu_step + 1e-9));
+  files.push_back(std::move(frame));
+}
+
+bool is_motion_frame(const std::string& name) {
+  constexpr std::string_view stem = "motion_", end = ".vtu";
+  return name.starts_with(stem) && name.ends_with(end) && name.size() > stem.size() + end.size() &&
+         name.find_first_not_of("0123456789", stem.size()) == name.size() - end.size();
+}
+
+void write_motion(const RunResult& r, const fs::path& folder, MotionFrames& frames) {
+  std::function<VtkGrid(size_t)> grid = [&r](size_t row) { return tree_picture(r, row); };
+  std::optional<Flyable> f;
+  if (!r.scene.is_tree) {
+    f.emplace(make_system(r.scene, r.bodies));
+    grid = [&](size_t row) { return grid_of(pose_at(r.scene, f->system, r.trajectory.y[row]), f->system); };
+  }
   for (size_t i = 0; i < r.trajectory.time.size(); ++i) {
     const double t = r.trajectory.time[i];
-    if (t < next - 1e-9 * r.scene.vtu_step) continue;
-    next += r.scene.vtu_step * std::max(1.0, std::ceil((t - next) / r.scene.vtu_step + 1e-9));
-    const std::string name = fmt::format("motion_{:05d}.vtu", frames.size());
+    if (t < frames.next - 1e-9 * r.scene.vtu_step) continue;
+    const std::string name = fmt::format("motion_{:05d}.vtu", frames.files.size());
     write_vtu(folder / name, grid(i));
-    frames.emplace_back(t, name);
+    frames.add({t, name}, r.scene.vtu_step);
   }
-  write_pvd(folder / "motion.pvd", frames);
-}
-
-void write_motion(const RunResult& r, const fs::path& folder) {
-  const Flyable f = make_system(r.scene, r.bodies);
-  write_frames(r, folder, [&](size_t i) { return grid_of(pose_at(r.scene, f.system, r.trajectory.y[i]), f.system); });
-}
-
-ordered_json write_results(const RunResult& r, const fs::path& folder) {
-  const Stopwatch start;
-  for (const char* old :
-       {"summary.json", "trajectory.csv", "events.csv", "state.toml", "motion.pvd", "report.html", "overview.svg"}) {
-    std::error_code ignored;
-    fs::remove(folder / old, ignored);
-  }
-  write_file(folder / "scene.toml", to_toml(r.scene));
-  write_file(folder / "trajectory.csv", [&r](std::ostream& out) { print_trajectory_csv(out, r.outputs); });
-  write_file(folder / "events.csv", events_csv(hinge_names(r), r.trajectory));
-  write_file(folder / "state.toml", to_toml(r.end, r.scene.name));
-  if (r.scene.vtu_step > 0) r.scene.is_tree ? write_tree_motion(r, folder) : write_motion(r, folder);
-  const double seconds = start.seconds();
-  ordered_json summary = summary_json(r, seconds);
-  write_file(folder / "summary.json", summary.dump(2) + "\n");
-  return summary;
+  write_pvd(folder / "motion.pvd", frames.files);
 }
 
 }  // namespace flexboom

@@ -10,6 +10,7 @@
 #include <functional>
 #include <iosfwd>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace flexboom {
@@ -17,25 +18,31 @@ namespace flexboom {
 /// Makes the folder and proves that it can be written to. @throws InputError.
 void prepare_folder(const std::filesystem::path&);
 
-/// trajectory.csv and events.csv, 17 significant digits. The first goes out row by row: as one text it may be
+/// Rows of trajectory.csv from `first` on, 17 significant digits. They go out one by one: as one text they may be
 /// gigabytes.
-void print_trajectory_csv(std::ostream&, const OutputTable&);
-std::string events_csv(const std::vector<std::string>& hinges, const Trajectory&);
+void print_rows(std::ostream&, const OutputTable&, size_t first);
 
-/// Keys of summary.json.
+/// events.csv: its header, and its rows from event `first` on.
+constexpr const char* events_header = "time,hinge,kind\n";
+std::string event_rows(const RunResult&, size_t first);
+
+/// Keys of summary.json, of a run that has ended.
 nlohmann::ordered_json summary_json(const RunResult&, double write_seconds);
 
-/// scene.toml, trajectory.csv, events.csv, summary.json, and motion.pvd with its .vtu files when the scene has a
-/// vtu_step. Files of an older run in the folder are removed first, and summary.json comes last: where it is, the rest
-/// is. Returns what summary.json says. @throws InputError as write_file.
-nlohmann::ordered_json write_results(const RunResult&, const std::filesystem::path& folder);
+/// Frames of motion.pvd: time [s] and file, and the time that the next one is wanted at.
+struct MotionFrames {
+  std::vector<std::pair<double, std::string>> files;
+  double next = 0;
 
-/// motion.pvd and motion_NNNNN.vtu, one grid per frame of the scene's vtu_step.
-void write_frames(const RunResult&, const std::filesystem::path& folder,
-                  const std::function<VtkGrid(size_t row)>& grid);
+  void add(std::pair<double, std::string>, double vtu_step);
+};
 
-/// motion.pvd and motion_NNNN.vtu: hub box and deformed booms in inertial axes.
-void write_motion(const RunResult&, const std::filesystem::path& folder);
+/// Is this the name of such a file?
+bool is_motion_frame(const std::string& name);
+
+/// motion.pvd and motion_NNNNN.vtu, bodies in inertial axes: a frame per vtu_step of the scene, behind those that are
+/// there.
+void write_motion(const RunResult&, const std::filesystem::path& folder, MotionFrames&);
 
 /// Points of the hub's box and the deformed booms at a state, inertial axes [m]; used by the VTU files and the report.
 struct Pose {

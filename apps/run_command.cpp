@@ -1,6 +1,6 @@
 #include "apps/commands.hpp"
 #include "apps/report.hpp"
-#include "apps/results.hpp"
+#include "apps/results_folder.hpp"
 #include "dynamics/integrator.hpp"
 #include "fem/check.hpp"
 
@@ -9,11 +9,13 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <fstream>
 #include <sstream>
 
 namespace flexboom {
@@ -25,25 +27,28 @@ static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only
 
 extern "C" void on_interrupt(int) { interrupted.store(true, std::memory_order_relaxed); }
 
-/// Ctrl-C ends the integration in order while one of these lives; a second Ctrl-C kills.
+/// Ctrl-C, a request to end, and a terminal that closes end the integration in order while one of these lives; a second
+/// one kills. Under nohup a closed terminal is still no reason to end.
 class InterruptGuard {
  public:
   InterruptGuard() {
     struct sigaction action = {};
     action.sa_handler = on_interrupt;
     action.sa_flags = static_cast<int>(SA_RESETHAND);
-    sigaction(SIGINT, &action, &before_int_);
-    sigaction(SIGTERM, &action, &before_term_);
+    for (size_t i = 0; i < signals.size(); ++i) {
+      sigaction(signals[i], &action, &before_[i]);
+      if (signals[i] == SIGHUP && before_[i].sa_handler == SIG_IGN) sigaction(SIGHUP, &before_[i], nullptr);
+    }
   }
   ~InterruptGuard() {
-    sigaction(SIGINT, &before_int_, nullptr);
-    sigaction(SIGTERM, &before_term_, nullptr);
+    for (size_t i = 0; i < signals.size(); ++i) sigaction(signals[i], &before_[i], nullptr);
   }
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
  private:
-  struct sigaction before_int_ = {}, before_term_ = {};
+  static constexpr std::array signals = {SIGINT, SIGTERM, SIGHUP};
+  std::array<struct sigaction, signals.size()> before_ = {};
 };
 
 /// One line on a terminal: percent, simulated / wall time, time left. Silent for work under a second and where stderr
@@ -92,9 +97,22 @@ void override_modes(Scene& scene, const std::string& text) {
   }
 }
 
+/// Did the run of this folder end, killed or failed, before it had a first state?
+bool never_flew(const std::filesystem::path& folder) {
+  std::ifstream summary(folder / "summary.json");
+  if (!summary || std::filesystem::exists(folder / "state.toml")) return false;
+  const nlohmann::json document = nlohmann::json::parse(summary, nullptr, false);
+  if (!document.is_object() || !document.contains("status")) return false;
+  return document["status"] == "running" || document["status"] == "failed";
+}
+
 /// The scene begins with a saved state, whose numbers of modes replace a choice by the program.
-void go_on(Scene& scene, const std::filesystem::path& from) {
-  auto saved = std::make_shared<const SavedState>(SavedState::read(from));
+void go_on(Scene& scene, const RunArguments& a) {
+  const std::filesystem::path& from = a.from;
+  if (never_flew(from))
+    return print_note(
+        fmt::format("--continue: the run in {} ended before its motion began; this one begins at 0 s", from.string()));
+  auto saved = std::make_shared<const SavedState>(SavedState::read(from, a.force));
   require(saved->time() < scene.duration,
           fmt::format("--continue: {} is of t = {:g} s, the run ends at {:g} s; --duration is the time at the end",
                       saved->file().string(), saved->time(), scene.duration));
@@ -104,13 +122,6 @@ void go_on(Scene& scene, const std::filesystem::path& from) {
     b.modes = modes->second;
   }
   scene.from = std::move(saved);
-}
-
-/// A run that goes on from a folder does not write into it.
-void check_folder(const Scene& scene, const std::filesystem::path& folder) {
-  std::error_code error;
-  if (!scene.from || !std::filesystem::equivalent(scene.from->file().parent_path(), folder, error)) return;
-  throw InputError(fmt::format("--continue: {} would be overwritten; give another folder by --out", folder.string()));
 }
 
 Scene scene_of(const RunArguments& a) {
@@ -126,7 +137,7 @@ Scene scene_of(const RunArguments& a) {
     for (BodyScene& b : scene.bodies)
       if (b.is_boom()) b.structure = *a.structure;
   if (a.no_budget) scene.error_budget = false;
-  if (!a.from.empty()) go_on(scene, a.from);
+  if (!a.from.empty()) go_on(scene, a);
   validate(scene);
   return scene;
 }
@@ -148,9 +159,37 @@ void print_summary(const RunResult& r, const std::filesystem::path& folder) {
 }
 
 /// The line is gone again before anything else is printed.
-RunResult run_with_progress(const Scene& scene, bool wanted) {
+RunResult run_with_progress(const Scene& scene, bool wanted, double checkpoint_every, ResultsFolder& results) {
   ProgressLine progress(wanted);
-  return run_scene(scene, {&interrupted, [&progress](double t, double T) { progress(t, T); }});
+  return run_scene(scene, {&interrupted, [&progress](double t, double T) { progress(t, T); }, checkpoint_every},
+                   [&results](const RunResult& so_far, size_t first) { results.add(so_far, first); });
+}
+
+void write_report(const std::filesystem::path& folder) {
+  write_file(folder / "report.html", report_html(folder));
+  write_file(folder / "overview.svg", overview_svg(folder));
+}
+
+/// Of a run that failed: as much as there is.
+void try_to_report(const std::filesystem::path& folder) {
+  try {
+    write_report(folder);
+  } catch (const std::exception&) {  // it has no rows yet
+  }
+}
+
+/// The run and its files; a run that fails leaves what it came to.
+RunResult run_into(ResultsFolder& results, const Scene& scene, const RunArguments& a, const CommonOptions& common) {
+  try {
+    RunResult r = run_with_progress(scene, !common.quiet && !common.json, a.checkpoint, results);
+    results.write(r);
+    if (a.report) write_report(results.path());
+    return r;
+  } catch (const std::exception& e) {
+    results.fail(e.what());
+    if (a.report) try_to_report(results.path());
+    throw;
+  }
 }
 
 /// Faults of a scene or body as the document of `check --json`; the error itself goes its usual way.
@@ -176,33 +215,29 @@ nlohmann::ordered_json checked(const std::string& name) {
 int run_command(const RunArguments& a, const CommonOptions& common) {
   const Scene scene = scene_of(a);
   const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results") / scene.name : common.out;
-  check_folder(scene, folder);
-  prepare_folder(folder);
+  ResultsFolder results(folder, scene, builtin_scene(a.scene) ? "" : a.scene);
   const InterruptGuard guard;
-  const RunResult result = run_with_progress(scene, !common.quiet && !common.json);
-  const nlohmann::ordered_json summary = write_results(result, folder);
-  if (a.report) {
-    write_file(folder / "report.html", report_html(folder));
-    write_file(folder / "overview.svg", overview_svg(folder));
-  }
+  const RunResult result = run_into(results, scene, a, common);
+  const IntegrationSummary& s = result.trajectory.summary;
+  const std::string wrong = is_balanced(s)
+                                ? ""
+                                : fmt::format("energy balance {:.1e}, momentum drift {:.1e}: the motion in {} is wrong",
+                                              s.energy_balance, s.momentum_drift, folder.string());
+  if (!wrong.empty()) results.fail(wrong);
   if (common.json) {
-    fmt::print("{}\n", summary.dump(2));
+    fmt::print("{}\n", results.summary().dump(2));
   } else if (!common.quiet) {
     print_summary(result, folder);
     if (a.report) fmt::print("report: {}\n", (folder / "report.html").string());
   }
   if (!common.quiet)
     for (const std::string& w : result.warnings) print_note("warning: " + w);
-  const IntegrationSummary& s = result.trajectory.summary;
-  if (!is_balanced(s))
-    throw NumericalError(fmt::format("energy balance {:.1e}, momentum drift {:.1e}: the motion in {} is wrong",
-                                     s.energy_balance, s.momentum_drift, folder.string()));
+  if (!wrong.empty()) throw NumericalError(wrong);
   if (!interrupted.load()) return exit_ok;
   if (!common.quiet)
     print_note(
-        result.trajectory.summary.interrupted
-            ? fmt::format("interrupted at t = {:g} s; what was computed is in {}", result.trajectory.time.back(),
-                          folder.string())
+        s.interrupted
+            ? fmt::format("interrupted at t = {:g} s; what was computed is in {}", result.end.time, folder.string())
             : fmt::format("interrupted after the run, which is whole, in {}; its errors may not have been measured",
                           folder.string()));
   return exit_interrupted;

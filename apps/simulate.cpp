@@ -296,15 +296,16 @@ IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, 
   o.rescale_at_events = scene.rescale_at_events;
   o.interrupt = hooks.interrupt;
   o.progress = hooks.progress;
+  o.checkpoint_every = hooks.checkpoint_every;
   if (max_steps > 0) o.max_steps = max_steps;
   return o;
 }
 
-FlightState end_of(const Run& run) {
+FlightState end_of(const std::vector<PreparedBody>& bodies, double time, const VectorXd& y) {
   FlightState end;
-  end.time = run.motion.time.back();
-  end.y = run.motion.y.back();
-  for (const PreparedBody& p : run.bodies) end.modes[p.body.name] = p.body.n();
+  end.time = time;
+  end.y = y;
+  for (const PreparedBody& p : bodies) end.modes[p.body.name] = p.body.n();
   return end;
 }
 
@@ -314,6 +315,14 @@ std::vector<std::string> hinge_names(const System& system) {
   std::vector<std::string> names;
   for (const Appendage& a : system.appendages()) names.push_back(a.body.name);
   return names;
+}
+
+FlightState end_of(const Flyable& f, const std::vector<PreparedBody>& bodies, const Trajectory& flight) {
+  FlightState end = end_of(bodies, flight.time.back(), flight.y.back());
+  end.names = state_names(f.system);
+  const std::vector<StopHistory>& stops = flight.summary.stops;
+  for (size_t i = 0; i < stops.size(); ++i) end.stops[f.system.appendages()[i].body.name] = stops[i];
+  return end;
 }
 
 }  // namespace
@@ -337,14 +346,23 @@ Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_ste
     options.stops = scene.from->stops(hinge_names(f.system));
   }
   r.prepare_seconds = start.seconds();
-  const Stopwatch flight;
-  r.motion = redundant ? integrate_by_multipliers(f.system, y, options) : integrate(f.system, y, options);
-  r.integrate_seconds = flight.seconds();
+  const Stopwatch watch;
+  Checkpoint<Trajectory> checkpoint;
+  size_t told = 0;
+  if (hooks.checkpoint)
+    checkpoint = [&](const Trajectory& so_far, size_t outputs) {
+      Run part = r;
+      part.motion = rows_of(so_far, told, outputs);
+      part.outputs = output_table(scene, f, part.motion);
+      part.end = end_of(f, r.bodies, so_far);
+      part.integrate_seconds = watch.seconds();
+      hooks.checkpoint(std::move(part), std::exchange(told, outputs));
+    };
+  r.motion = redundant ? integrate_by_multipliers(f.system, y, options, checkpoint)
+                       : integrate(f.system, y, options, checkpoint);
+  r.integrate_seconds = watch.seconds();
   r.outputs = output_table(scene, f, r.motion);
-  r.end = end_of(r);
-  const IntegrationSummary& s = r.motion.summary;
-  r.end.names = state_names(f.system);
-  for (size_t i = 0; i < s.stops.size(); ++i) r.end.stops[f.system.appendages()[i].body.name] = s.stops[i];
+  r.end = end_of(f, r.bodies, r.motion);
   return r;
 }
 
@@ -395,23 +413,52 @@ void add_warnings(RunResult& r) {
 
 }  // namespace
 
+namespace {
+
+/// What was flown and what is odd about it.
+void add_words(const Run& run, RunResult& r) {
+  if (r.scene.from)
+    r.plan.push_back(fmt::format("start: goes on from {} at t = {:g} s; counts and errors are those since then",
+                                 r.scene.from->file().string(), r.scene.from->time()));
+  describe(r.scene, run, r.plan);
+  r.warnings = r.scene.warnings;
+  r.warnings.insert(r.warnings.end(), run.warnings.begin(), run.warnings.end());
+}
+
+void take(Run run, RunResult& r) {
+  r.bodies = std::move(run.bodies);
+  r.tree = std::move(run.tree);
+  r.trajectory = std::move(run.motion);
+  r.outputs = std::move(run.outputs);
+  r.end = std::move(run.end);
+  r.prepare_seconds = run.prepare_seconds;
+  r.integrate_seconds = run.integrate_seconds;
+}
+
+}  // namespace
+
 bool is_balanced(const IntegrationSummary& s) {
   constexpr double broken = 0.01;  // far above any tolerance that is accepted for a step
   return s.energy_balance <= broken && s.momentum_drift <= broken;
 }
 
-RunResult run_scene(const Scene& given, const RunHooks& hooks) {
+RunResult run_scene(const Scene& given, const RunHooks& hooks,
+                    const std::function<void(const RunResult& so_far, size_t first)>& so_far) {
   RunResult r;
   r.scene = given;
   validate(r.scene);
   choose_modes(r.scene, hooks, r.plan);
-  Run run = run_once(r.scene, hooks);
-  if (r.scene.from)
-    r.plan.push_back(
-        fmt::format("start: goes on from {} at t = {:g} s", r.scene.from->file().string(), r.scene.from->time()));
-  describe(r.scene, run, r.plan);
-  r.warnings = r.scene.warnings;
-  r.warnings.insert(r.warnings.end(), run.warnings.begin(), run.warnings.end());
+  RunHooks of_run = hooks;
+  if (so_far)
+    of_run.checkpoint = [&](Run run, size_t first) {
+      RunResult part = r;
+      add_words(run, part);
+      take(std::move(run), part);
+      part.trajectory.summary.interrupted = false;  // not yet
+      so_far(part, first);
+    };
+  Run run = run_once(r.scene, of_run);
+  add_words(run, r);
   // The repeats cost many times the run; a long one is not repeated.
   constexpr long worth_repeating = 2'000'000;
   const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating;
@@ -424,13 +471,7 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks) {
     r.budget_seconds = start.seconds();
   }
   add_warnings(r);
-  r.bodies = std::move(run.bodies);
-  r.tree = std::move(run.tree);
-  r.trajectory = std::move(run.motion);
-  r.outputs = std::move(run.outputs);
-  r.end = std::move(run.end);
-  r.prepare_seconds = run.prepare_seconds;
-  r.integrate_seconds = run.integrate_seconds;
+  take(std::move(run), r);
   return r;
 }
 

@@ -7,10 +7,12 @@
 #include "reduction/inertia_invariants.hpp"
 
 #include <atomic>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 namespace flexboom {
@@ -66,13 +68,21 @@ struct Flyable {
 };
 Flyable make_system(const Scene&, const std::vector<PreparedBody>&);
 
+struct Run;
+
 struct RunHooks {
   const std::atomic<bool>* interrupt = nullptr;
-  std::function<void(double time, double duration)> progress;
+  std::function<void(double time, double duration)> progress{};
+  double checkpoint_every = 10;  // wall time between two checkpoints [s]
+  /// Told at every checkpoint of a flight: the run so far, whose rows begin with row `first` of the flight. Its end is
+  /// the state there. Row 0 comes again where the flight begins anew.
+  std::function<void(Run so_far, size_t first)> checkpoint{};
 };
 
-/// The whole chain. @throws InputError, NumericalError.
-RunResult run_scene(const Scene&, const RunHooks&);
+/// The whole chain. `so_far`: told of the run itself as RunHooks::checkpoint, not of its repeats.
+/// @throws InputError, NumericalError.
+RunResult run_scene(const Scene&, const RunHooks&,
+                    const std::function<void(const RunResult& so_far, size_t first)>& so_far = {});
 
 /// Do energy and momenta balance as well as any run must? If not, the motion is wrong whatever the tolerance was.
 bool is_balanced(const IntegrationSummary&);
@@ -102,7 +112,20 @@ Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
 OutputTable output_table(const Scene&, const Flyable&, const Trajectory&);
 
 /// Time, numbers and modes at the end of a flight; names and stops are for the caller.
-FlightState end_of(const Run&);
+FlightState end_of(const std::vector<PreparedBody>&, double time, const Eigen::VectorXd& y);
+
+/// Of a flight on its way: its events and summary, and the rows from `first` on that come before `last`.
+template <class Flight>
+Flight rows_of(const Flight& f, size_t first, size_t last) {
+  const auto part = [&](const auto& rows) {
+    return std::decay_t<decltype(rows)>(rows.begin() + static_cast<std::ptrdiff_t>(first),
+                                        rows.begin() + static_cast<std::ptrdiff_t>(last));
+  };
+  Flight r;
+  r.time = part(f.time), r.y = part(f.y), r.balance = part(f.balance);
+  r.events = f.events, r.summary = f.summary;
+  return r;
+}
 
 /// Largest relative difference over the wanted outputs that both tables have (all when `wanted` is empty): for each
 /// output, a vector counting as one, max over time of |a - b| over max |b|.

@@ -194,12 +194,13 @@ std::vector<std::string> joint_names(const Scene& scene) {
   return names;
 }
 
-void set_end(Run& run, const Scene& scene) {
-  run.end = end_of(run);
-  run.end.names = state_names(*run.tree);
-  const std::vector<StopHistory>& stops = run.motion.summary.stops;
+FlightState end_of(const Run& run, const Scene& scene, double time, const VectorXd& y,
+                   const std::vector<StopHistory>& stops) {
+  FlightState end = end_of(run.bodies, time, y);
+  end.names = state_names(*run.tree);
   for (size_t i = 0; i < stops.size(); ++i)
-    if (scene.joints[i].mechanism.stop_stiffness > 0) run.end.stops[scene.joints[i].name] = stops[i];
+    if (scene.joints[i].mechanism.stop_stiffness > 0) end.stops[scene.joints[i].name] = stops[i];
+  return end;
 }
 
 void set_corners(const Scene& scene, IntegratorOptions& o) {
@@ -235,6 +236,18 @@ IntegratorOptions options_of(const Scene& scene, const Multibody& bodies, const 
 
 bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty(); }
 
+/// What results are made of.
+void set_flown(const Scene& scene, TreeTrajectory flight, const std::vector<Stiffening>& stiffening, Run& r) {
+  r.outputs = tree_output_table(scene, *r.tree, flight);
+  r.stiffening_effect = flight.stiffening_effect;
+  r.stiffening_left_out = largest_left_out(r.stiffening_effect, stiffening);
+  r.warnings = std::move(flight.warnings);
+  r.motion.time = std::move(flight.time);
+  r.motion.y = std::move(flight.y);
+  r.motion.events = std::move(flight.events);
+  r.motion.summary = std::move(flight.summary);
+}
+
 }  // namespace
 
 std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& bodies) {
@@ -261,6 +274,24 @@ bool revise_stiffening(const Scene& scene, const Multibody& bodies, const std::v
   return changed;
 }
 
+bool will_be_revised(const Scene& scene, const Multibody& bodies, const std::vector<double>& effect,
+                     std::vector<Stiffening> choice) {
+  return revise_stiffening(scene, bodies, effect, choice);
+}
+
+void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<double>& effect,
+                       std::vector<Stiffening>& choice, const std::function<bool()>& fly) {
+  for (bool again = true; again;) {
+    effect.assign(choice.size(), 0.0);
+    try {
+      const bool interrupted = fly();
+      again = !interrupted && revise_stiffening(scene, bodies, effect, choice);
+    } catch (const NumericalError&) {
+      if (!revise_stiffening(scene, bodies, effect, choice)) throw;
+    }
+  }
+}
+
 double largest_left_out(const std::vector<double>& effect, const std::vector<Stiffening>& choice) {
   double worst = 0;
   for (size_t i = 0; i < effect.size(); ++i)
@@ -278,21 +309,33 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   r.bodies = std::move(bodies);
   r.prepare_seconds = start.seconds();
   const Stopwatch flight_time;
+  size_t told = 0;
+  std::vector<double> effect;  // of the flight so far
+  Checkpoint<TreeTrajectory> checkpoint;
+  if (hooks.checkpoint)
+    checkpoint = [&](const TreeTrajectory& so_far, size_t outputs) {
+      effect = so_far.stiffening_effect;
+      if (will_be_revised(scene, multibody, effect, stiffening)) return;
+      Run part = r;
+      TreeTrajectory rows = rows_of(so_far, told, outputs);
+      rows.stiffening_effect = so_far.stiffening_effect, rows.warnings = so_far.warnings;
+      set_flown(scene, std::move(rows), stiffening, part);
+      part.end = end_of(part, scene, so_far.time.back(), so_far.y.back(), so_far.summary.stops);
+      part.integrate_seconds = flight_time.seconds();
+      hooks.checkpoint(std::move(part), std::exchange(told, outputs));
+    };
   TreeTrajectory flight;
-  do {
+  const auto fly = [&] {
+    told = 0;
     r.tree = std::make_shared<const Tree>(multibody, stiffening);
-    flight = integrate(*r.tree, first_state(scene, *r.tree), options);
-  } while (!flight.summary.interrupted && revise_stiffening(scene, multibody, flight.stiffening_effect, stiffening));
-  r.outputs = tree_output_table(scene, *r.tree, flight);
-  r.stiffening_effect = flight.stiffening_effect;
-  r.stiffening_left_out = largest_left_out(r.stiffening_effect, stiffening);
-  r.warnings = std::move(flight.warnings);
-  r.motion.time = std::move(flight.time);
-  r.motion.y = std::move(flight.y);
-  r.motion.events = std::move(flight.events);
-  r.motion.summary = std::move(flight.summary);
+    flight = integrate(*r.tree, first_state(scene, *r.tree), options, checkpoint);
+    effect = flight.stiffening_effect;
+    return flight.summary.interrupted;
+  };
+  fly_until_settled(scene, multibody, effect, stiffening, fly);
+  r.end = end_of(r, scene, flight.time.back(), flight.y.back(), flight.summary.stops);
+  set_flown(scene, std::move(flight), stiffening, r);
   r.integrate_seconds = flight_time.seconds();
-  set_end(r, scene);
   return r;
 }
 

@@ -2,6 +2,7 @@
 
 #include "apps/simulate.hpp"
 #include "dynamics/tree_integrator.hpp"
+#include "fem/vtk.hpp"
 
 #include <functional>
 #include <string>
@@ -20,8 +21,8 @@ Eigen::VectorXd first_state(const Scene&, const Tree&);
 
 std::vector<std::string> joint_names(const Scene&);
 
-/// Sets the end of a flight of a scene with joints.
-void set_end(Run&, const Scene&);
+/// Where a flight of a scene with joints is.
+FlightState end_of(const Run&, const Scene&, double time, const Eigen::VectorXd& y, const std::vector<StopHistory>&);
 
 /// The boom's, rigid or reduced body of a scene with joints, with its geometric stiffness where it has one.
 PreparedBody prepare_rigid(const BodyScene&);
@@ -32,6 +33,14 @@ std::vector<Stiffening> first_stiffening(const Scene&, const Multibody&);
 
 /// Turns on what a flight showed to count: `effect` per body. Was there any?
 bool revise_stiffening(const Scene&, const Multibody&, const std::vector<double>& effect, std::vector<Stiffening>&);
+
+/// Would that turn on any? Then the flight that showed it is not worth keeping.
+bool will_be_revised(const Scene&, const Multibody&, const std::vector<double>& effect, std::vector<Stiffening>);
+
+/// Flies until no flight shows more that counts; one that fails without it is flown again with it. `fly` sets `effect`
+/// and says whether it was interrupted. @throws NumericalError as `fly`.
+void fly_until_settled(const Scene&, const Multibody&, std::vector<double>& effect, std::vector<Stiffening>&,
+                       const std::function<bool()>& fly);
 
 /// Of the bodies where it is off.
 double largest_left_out(const std::vector<double>& effect, const std::vector<Stiffening>&);
@@ -63,7 +72,7 @@ void describe_tree(const Scene&, const Run&, std::vector<std::string>& plan);
 /// Does nothing from outside push the scene, so that its momenta are kept?
 bool flies_freely(const Scene&);
 
-/// motion.pvd and motion_NNNNN.vtu: boxes of rigid bodies and deformed flexible ones, inertial axes.
-void write_tree_motion(const RunResult&, const std::filesystem::path& folder);
+/// Boxes of rigid bodies and deformed flexible ones at a row of the run, inertial axes.
+VtkGrid tree_picture(const RunResult&, size_t row);
 
 }  // namespace flexboom

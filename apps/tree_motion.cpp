@@ -1,6 +1,5 @@
 // Pictures of scenes with joints for ParaView.
 
-#include "apps/results.hpp"
 #include "apps/tree_flight.hpp"
 
 namespace flexboom {
@@ -76,22 +75,20 @@ void add_flexible(const DisplayShape& shape, const PlaceMotionInSpace& brf, cons
 
 }  // namespace
 
-void write_tree_motion(const RunResult& r, const std::filesystem::path& folder) {
-  write_frames(r, folder, [&r](size_t row) {
-    const Eigen::VectorXd& y = r.trajectory.y[row];
-    const TreeState s = r.tree->unpack(y);
-    Picture picture;
-    for (size_t b = 0; b < r.bodies.size(); ++b) {
-      Place place;
-      place.body = static_cast<int>(b);
-      const PlaceMotionInSpace brf = r.tree->motion(r.trajectory.time[row], y, place);
-      if (r.scene.bodies[b].rigid)
-        add_rigid(*r.scene.bodies[b].rigid, brf, b, picture);
-      else
-        add_flexible(r.bodies[b].body.display, brf, s.q[b], b, picture);
-    }
-    return finished(std::move(picture));
-  });
+VtkGrid tree_picture(const RunResult& r, size_t row) {
+  const Eigen::VectorXd& y = r.trajectory.y[row];
+  const TreeState s = r.tree->unpack(y);
+  Picture picture;
+  for (size_t b = 0; b < r.bodies.size(); ++b) {
+    Place place;
+    place.body = static_cast<int>(b);
+    const PlaceMotionInSpace brf = r.tree->motion(r.trajectory.time[row], y, place);
+    if (r.scene.bodies[b].rigid)
+      add_rigid(*r.scene.bodies[b].rigid, brf, b, picture);
+    else
+      add_flexible(r.bodies[b].body.display, brf, s.q[b], b, picture);
+  }
+  return finished(std::move(picture));
 }
 
 }  // namespace flexboom

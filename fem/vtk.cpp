@@ -7,7 +7,9 @@
 #include <fmt/format.h>
 
 #include <bit>
+#include <charconv>
 #include <cstdint>
+#include <fstream>
 #include <iterator>
 
 namespace flexboom {
@@ -180,6 +182,24 @@ void write_pvd(const std::filesystem::path& path, const std::vector<std::pair<do
   }
   text += "</Collection>\n</VTKFile>\n";
   write_file(path, text);
+}
+
+std::vector<std::pair<double, std::string>> read_pvd(const std::filesystem::path& path) {
+  constexpr std::string_view head = "<DataSet timestep=\"", middle = "\" part=\"0\" file=\"", end = "\"/>";
+  std::vector<std::pair<double, std::string>> files;
+  std::ifstream in(path, std::ios::binary);
+  std::string line;
+  for (size_t number = 1; std::getline(in, line); ++number) {
+    if (!line.starts_with("<DataSet")) continue;
+    const size_t split = line.find(middle);
+    double time = 0;
+    const bool ours = line.starts_with(head) && split != std::string::npos && line.ends_with(end) &&
+                      std::from_chars(line.data() + head.size(), line.data() + split, time).ptr == line.data() + split;
+    require(ours, fmt::format("{}:{}: is not as flexboom wrote it", path.string(), number));
+    const size_t name = split + middle.size();
+    files.emplace_back(time, line.substr(name, line.size() - end.size() - name));
+  }
+  return files;
 }
 
 }  // namespace flexboom

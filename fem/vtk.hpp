@@ -54,4 +54,7 @@ MeshFile read_vtu(std::string_view text, const std::string& file);
 /// Writes a .pvd collection of (time [s], file relative to the .pvd).
 void write_pvd(const std::filesystem::path&, const std::vector<std::pair<double, std::string>>&);
 
+/// What write_pvd wrote. @throws InputError with file:line for anything else.
+std::vector<std::pair<double, std::string>> read_pvd(const std::filesystem::path&);
+
 }  // namespace flexboom

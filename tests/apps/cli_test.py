@@ -368,15 +368,13 @@ class RunFiles(Case):
             np.testing.assert_allclose(b[name], a[name][20:], atol=1e-5 * np.abs(a[name]).max(), err_msg=name)
         self.assertIn("goes on from", "\n".join(self.summary(later)["plan"]))
         self.assertAlmostEqual(self.summary(later)["simulated_seconds"], 0.2)
-        # The same from the file; not into its own folder, nor back in time, nor from nothing or another scene.
+        # The same from the file; not back in time, nor from nothing or another scene.
         self.assert_exit(OK, flexboom("run", "sport", "--duration", "0.3", "--no-budget", "--continue",
                                       first / "state.toml", "--out", self.folder / "again"))
         before = (first / "trajectory.csv").read_bytes()
-        for arguments, words in [(("--duration", "0.4", "--out", first), "would be overwritten"),
-                                 (("--duration", "0.1", "--out", self.folder / "out"), "the run ends at 0.1 s")]:
-            result = flexboom("run", "sport", "--continue", first, *arguments)
-            self.assert_exit(INPUT, result)
-            self.assertIn(words, result.stderr)
+        result = flexboom("run", "sport", "--continue", first, "--duration", "0.1", "--out", self.folder / "out")
+        self.assert_exit(INPUT, result)
+        self.assertIn("the run ends at 0.1 s", result.stderr)
         self.assertEqual((first / "trajectory.csv").read_bytes(), before)
         result = flexboom("run", "sport", "--continue", self.folder / "nowhere", "--out", self.folder / "out")
         self.assert_exit(INPUT, result)
@@ -638,18 +636,24 @@ class DiskFull(Case):
     def limited(self, size, *arguments):
         return flexboom(*arguments, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
 
-    def test_trajectory_is_whole_or_absent(self):
+    def test_trajectory_is_whole_or_the_run_says_that_it_failed(self):
         out = self.folder / "out"
         result = self.limited(20000, "run", "sport", "--no-budget", "--duration", "1", "--out", out)
         self.assert_exit(INPUT, result)
         self.assertIn(f"cannot write {out / 'trajectory.csv'}: File too large", result.stderr)
-        self.assertEqual(os.listdir(out), ["scene.toml"])
+        self.check_failed(out)
+
+    def check_failed(self, out):
+        """As far as the first checkpoint, at the start."""
+        self.assertEqual(self.summary(out)["status"], "failed")
+        self.assertEqual(set(os.listdir(out)),
+                         {"scene.toml", "summary.json", "state.toml", "trajectory.csv", "events.csv"})
+        self.assertEqual(len(read_csv(out / "trajectory.csv")), 2)
 
     def test_no_mixture_with_an_older_run(self):
         out = self.run_sport("--duration", "0.1", "--report", "--vtu-step", "0.1")
         self.assert_exit(INPUT, self.limited(20000, "run", "sport", "--no-budget", "--duration", "1", "--out", out))
-        left = {file for file in os.listdir(out) if not file.endswith(".vtu")}
-        self.assertEqual(left, {"scene.toml"})
+        self.check_failed(out)
 
     def test_nothing_can_be_written(self):
         out = self.folder / "out"
@@ -679,7 +683,7 @@ class DiskFull(Case):
         result = flexboom("run", "sport", "--no-budget", "--duration", "2", "--out", disk / "out")
         self.assert_exit(INPUT, result)
         self.assertIn("trajectory.csv: No space left on device", result.stderr)
-        self.assertEqual(os.listdir(disk / "out"), ["scene.toml"])
+        self.check_failed(disk / "out")
 
 
 # Boom axes of SPORT: hinge point and outward normal in hub axes; stowed along y, so at angle th the boom's x axis is

@@ -142,7 +142,7 @@ TEST(ContinueState, BadFilesAreRefusedWithTheirPlace) {
   };
   for (const auto& [text, words] : cases) {
     try {
-      state_of(text).values(names);
+      state_of(text, true).values(names);
       FAIL() << words;
     } catch (const InputError& error) {
       EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();

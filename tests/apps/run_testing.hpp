@@ -25,13 +25,13 @@ inline Scene scene_named(const std::string& name) {
 }
 
 /// The text as a file, read as a state. Tests run side by side: the file is this process's own.
-inline SavedState state_of(const std::string& text) {
+inline SavedState state_of(const std::string& text, bool changed_too = false) {
   const std::filesystem::path folder =
       std::filesystem::path(::testing::TempDir()) / ("state." + std::to_string(::getpid()));
   std::filesystem::create_directories(folder);
   const std::shared_ptr<void> at_end(nullptr, [&](void*) { std::filesystem::remove_all(folder); });
   std::ofstream(folder / "state.toml") << text;
-  return SavedState::read(folder / "state.toml");
+  return SavedState::read(folder / "state.toml", changed_too);
 }
 
 /// The scene from where a run ended.
