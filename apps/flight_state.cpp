@@ -134,6 +134,10 @@ std::string to_toml(const FlightState& state, const std::string& scene) {
   out.key("time", state.time, "[s]");
   out.table("[modes]");
   for (const auto& [body, n] : state.modes) out.key(toml(body), n);
+  out.table("[largest]");
+  out.key("energy", state.largest.energy, "[J], of the whole flight: what its balances are relative to");
+  out.key("momentum", state.largest.momentum, "[N s]");
+  out.key("angular_momentum", state.largest.angular_momentum, "[N m s]");
   out.table("[state]");
   for (size_t i = 0; i < state.names.size(); ++i) out.key(toml(state.names[i]), state.y[static_cast<Index>(i)]);
   out.table("[stops.largest_rate]");
@@ -159,6 +163,7 @@ struct SavedState::Content {
   double time = 0;
   std::map<std::string, int> modes;
   std::map<std::string, StopHistory> stops;
+  MotionScales largest;
   std::map<std::string, double> loops;
 };
 
@@ -229,6 +234,15 @@ SavedState SavedState::read(const fs::path& path, bool changed_too) {
       if (content->modes[body] < 0) modes->fault(body, "must be a number of modes");
     }
   table.table("state", true);
+  if (std::optional<TableReader> largest = table.table("largest", true)) {
+    MotionScales& l = content->largest;
+    for (const auto& [name, value] : {std::pair{"energy", &l.energy}, std::pair{"momentum", &l.momentum},
+                                      std::pair{"angular_momentum", &l.angular_momentum}}) {
+      *value = finite(*largest, name);
+      if (*value < 0) largest->fault(name, "must not be negative");
+    }
+    largest->reject_unknown();
+  }
   if (std::optional<TableReader> stops = table.table("stops", true)) {
     for (const auto& [name, rate] : numbers_of(*stops, "largest_rate")) content->stops[name].largest_rate = rate;
     for (const auto& [name, gap] : numbers_of(*stops, "largest_gap")) content->stops[name].largest_gap = gap;
@@ -254,6 +268,7 @@ SavedState::SavedState(SavedState&&) noexcept = default;
 const fs::path& SavedState::file() const { return content_->file; }
 double SavedState::time() const { return content_->time; }
 const std::map<std::string, int>& SavedState::modes() const { return content_->modes; }
+const MotionScales& SavedState::largest() const { return content_->largest; }
 
 VectorXd SavedState::values(const std::vector<std::string>& names) const {
   Faults faults;

@@ -22,6 +22,7 @@ struct FlightState {
   Eigen::VectorXd y;                         // by names
   std::map<std::string, int> modes;          // by body
   std::map<std::string, StopHistory> stops;  // by hinge or joint
+  MotionScales largest;                      // by which balances are judged
   std::map<std::string, double> loops;       // angles of hinges that close loops [rad]: which turn they are in
 };
 
@@ -44,6 +45,7 @@ class SavedState {
   const std::filesystem::path& file() const;
   double time() const;
   const std::map<std::string, int>& modes() const;
+  const MotionScales& largest() const;
 
   /// The numbers of these names. @throws InputError naming each that is missing, not finite or too many.
   Eigen::VectorXd values(const std::vector<std::string>& names) const;

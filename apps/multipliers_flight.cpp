@@ -50,7 +50,7 @@ IntegrationSummary summary_of(const MultipliersSummary& s) {
   r.factorisations = s.factorisations, r.newton_iterations = s.newton_iterations;
   r.error_test_failures = s.error_test_failures, r.restarts = s.restarts;
   r.seconds = s.seconds;
-  r.energy_balance = s.energy_balance, r.momentum_drift = s.momentum_drift;
+  r.energy_balance = s.energy_balance, r.momentum_drift = s.momentum_drift, r.largest = s.largest;
   r.constraint_drift = std::max({s.position_drift, s.angle_drift, s.quaternion_drift});
   r.stops = s.stops;
   r.interrupted = s.interrupted;
@@ -188,7 +188,7 @@ void set_flown(const FlownByMultipliers& f, size_t first, size_t last, const std
   r.warnings = warnings_of(f.scene, f.flight, r.stiffening_effect, stiffening);
   r.motion.events = events_of(f.flight.events, 0);
   r.motion.summary = summary_of(f.flight.summary);
-  r.end = end_of(r, f.scene, f.flight.time.back(), f.y(f.states.size() - 1), r.motion.summary.stops);
+  r.end = end_of(r, f.scene, f.flight.time.back(), f.y(f.states.size() - 1), r.motion.summary);
   for (size_t i = 0; i < f.scene.joints.size(); ++i)
     if (f.scene.joints[i].closes_loop && f.scene.joints[i].kind == JointKind::hinge)
       r.end.loops[f.scene.joints[i].name] = f.states.back().joints[i].coordinate[0];

@@ -70,9 +70,6 @@ std::string event_rows(const RunResult& r, size_t first) {
 
 namespace {
 
-/// Is something from outside free to change the momenta?
-bool momenta_change(const Scene& scene) { return scene.is_tree ? !flies_freely(scene) : scene.hub.fixed; }
-
 ordered_json budget_json(const ErrorBudget& b) {
   if (!b.measured)
     return {{"discretisation", nullptr},
@@ -140,7 +137,7 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   j["integrator"] = s.method;
   j["tolerance"] = r.scene.tolerance;
   j["energy_balance"] = s.energy_balance;
-  j["momentum_drift"] = momenta_change(r.scene) ? ordered_json() : ordered_json(s.momentum_drift);
+  j["momentum_drift"] = s.momentum_drift;  // unknown is null
   j["constraint_drift"] = s.constraint_drift;
   j["error_budget"] = budget_json(r.budget);
   j["accuracy_met"] = r.budget.measured ? ordered_json(r.budget.total() <= r.scene.tolerance) : ordered_json();

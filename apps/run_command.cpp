@@ -13,6 +13,7 @@
 #include <atomic>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <fstream>
@@ -142,6 +143,12 @@ Scene scene_of(const RunArguments& a) {
   return scene;
 }
 
+std::string measured(double value) { return std::isnan(value) ? "not measured" : fmt::format("{:.1e}", value); }
+
+std::string balances(const IntegrationSummary& s) {
+  return fmt::format("energy balance {}, momentum drift {}", measured(s.energy_balance), measured(s.momentum_drift));
+}
+
 void print_summary(const RunResult& r, const std::filesystem::path& folder) {
   const IntegrationSummary& s = r.trajectory.summary;
   const double simulated = r.trajectory.time.back() - r.trajectory.time.front();
@@ -149,7 +156,7 @@ void print_summary(const RunResult& r, const std::filesystem::path& folder) {
   fmt::print("\n{:g} s in {:.3f} s ({:.0f} times real time): {} steps, {} evaluations, {} events\n", simulated,
              r.integrate_seconds, simulated / std::max(r.integrate_seconds, 1e-9), s.steps, s.rhs_evaluations,
              r.trajectory.events.size());
-  fmt::print("energy balance {:.1e}, momentum drift {:.1e} (relative)\n", s.energy_balance, s.momentum_drift);
+  fmt::print("{} (relative)\n", balances(s));
   if (r.budget.measured)
     fmt::print(
         "errors of the outputs: discretisation {:.1e}, truncation {:.1e}, time {:.1e}, linearisation {:.1e}; total "
@@ -221,8 +228,7 @@ int run_command(const RunArguments& a, const CommonOptions& common) {
   const IntegrationSummary& s = result.trajectory.summary;
   const std::string wrong = is_balanced(s)
                                 ? ""
-                                : fmt::format("energy balance {:.1e}, momentum drift {:.1e}: the motion in {} is wrong",
-                                              s.energy_balance, s.momentum_drift, folder.string());
+                                : fmt::format("{}: the motion in {} is wrong", balances(s), folder.string());
   if (!wrong.empty()) results.fail(wrong);
   if (common.json) {
     fmt::print("{}\n", results.summary().dump(2));

@@ -195,8 +195,9 @@ std::vector<std::string> joint_names(const Scene& scene) {
 }
 
 FlightState end_of(const Run& run, const Scene& scene, double time, const VectorXd& y,
-                   const std::vector<StopHistory>& stops) {
-  FlightState end = end_of(run.bodies, time, y);
+                   const IntegrationSummary& summary) {
+  const std::vector<StopHistory>& stops = summary.stops;
+  FlightState end = end_of(run.bodies, time, y, summary.largest);
   end.names = state_names(*run.tree);
   for (size_t i = 0; i < stops.size(); ++i)
     if (scene.joints[i].mechanism.stop_stiffness > 0) end.stops[scene.joints[i].name] = stops[i];
@@ -320,7 +321,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
       TreeTrajectory rows = rows_of(so_far, told, outputs);
       rows.stiffening_effect = so_far.stiffening_effect, rows.warnings = so_far.warnings;
       set_flown(scene, std::move(rows), stiffening, part);
-      part.end = end_of(part, scene, so_far.time.back(), so_far.y.back(), so_far.summary.stops);
+      part.end = end_of(part, scene, so_far.time.back(), so_far.y.back(), so_far.summary);
       part.integrate_seconds = flight_time.seconds();
       hooks.checkpoint(std::move(part), std::exchange(told, outputs));
     };
@@ -333,17 +334,10 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
     return flight.summary.interrupted;
   };
   fly_until_settled(scene, multibody, effect, stiffening, fly);
-  r.end = end_of(r, scene, flight.time.back(), flight.y.back(), flight.summary.stops);
+  r.end = end_of(r, scene, flight.time.back(), flight.y.back(), flight.summary);
   set_flown(scene, std::move(flight), stiffening, r);
   r.integrate_seconds = flight_time.seconds();
   return r;
-}
-
-bool flies_freely(const Scene& scene) {
-  bool free = scene.gravity.isZero(0) && scene.loads.empty();
-  for (const JointScene& j : scene.joints) free = free && (!j.a.body.empty() || j.kind == JointKind::free);
-  for (const SpringScene& s : scene.springs) free = free && !s.a.body.empty() && !s.b.body.empty();
-  return free;
 }
 
 }  // namespace flexboom

@@ -22,7 +22,7 @@ Eigen::VectorXd first_state(const Scene&, const Tree&);
 std::vector<std::string> joint_names(const Scene&);
 
 /// Where a flight of a scene with joints is.
-FlightState end_of(const Run&, const Scene&, double time, const Eigen::VectorXd& y, const std::vector<StopHistory>&);
+FlightState end_of(const Run&, const Scene&, double time, const Eigen::VectorXd& y, const IntegrationSummary&);
 
 /// The boom's, rigid or reduced body of a scene with joints, with its geometric stiffness where it has one.
 PreparedBody prepare_rigid(const BodyScene&);
@@ -68,9 +68,6 @@ OutputTable tree_output_table(const Scene&, const Tree&, const TreeTrajectory&);
 
 /// What was flown, one line each.
 void describe_tree(const Scene&, const Run&, std::vector<std::string>& plan);
-
-/// Does nothing from outside push the scene, so that its momenta are kept?
-bool flies_freely(const Scene&);
 
 /// Boxes of rigid bodies and deformed flexible ones at a row of the run, inertial axes.
 VtkGrid tree_picture(const RunResult&, size_t row);

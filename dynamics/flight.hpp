@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -20,6 +21,17 @@ struct StopHistory {
   std::optional<bool> closed{};  // at the end; unknown: as gap and rate are
 };
 
+/// What was not measured.
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+/// The largest that a flight has had: what its balances are judged against. Once a motion has died, nothing else tells
+/// what is much.
+struct MotionScales {
+  double energy = 0;            // [J]
+  double momentum = 0;          // sum over the bodies of the norms [N s]
+  double angular_momentum = 0;  // the same [N m s]
+};
+
 /// What every flight is asked for, whatever the coordinates and the method.
 struct FlightOptions {
   double tolerance = 1e-6;    // relative error wanted in every output (max over time / max of the output)
@@ -31,6 +43,7 @@ struct FlightOptions {
   double settle = -1;
   /// Per hinge of a System, per joint of other scenes: of a flight that this one goes on. Empty: none was met.
   std::vector<StopHistory> stops{};
+  MotionScales largest{};  // of a flight that this one goes on
   /// Times where forces or prescribed motions are not smooth, ascending [s]: a step ends there and the method starts
   /// anew. Not of a System.
   std::vector<double> corners{};

@@ -1,6 +1,7 @@
 #include "dynamics/integrator.hpp"
 
 #include "dynamics/arkode.hpp"
+#include "dynamics/conservation.hpp"
 #include "dynamics/cvode.hpp"
 #include "dynamics/exponential.hpp"
 #include "dynamics/rotation.hpp"
@@ -419,20 +420,16 @@ class Flight {
 
   /// Energy and momentum balances over the outputs.
   void conservation(IntegrationSummary& s) const {
-    const Balance& first = result_.balance.front();
-    double energy = 0, gap = 0, dP = 0, dH = 0, P = 0, H = 0;
+    double mass = system_.hub().m, inertia = system_.hub().J0.trace();
+    for (const Appendage& a : system_.appendages()) mass += a.body.m, inertia += a.body.J0.trace();
+    Conservation kept(mass, inertia, options_.largest);
     for (size_t i = 0; i < result_.time.size(); ++i) {
       const Balance& b = result_.balance[i];
-      const double total = b.kinetic + b.elastic + dissipated(i) - dissipated(0);
-      energy = std::max(energy, std::abs(b.kinetic) + std::abs(b.elastic));
-      gap = std::max(gap, std::abs(total - (first.kinetic + first.elastic)));
-      dP = std::max(dP, (b.momentum - first.momentum).norm());
-      dH = std::max(dH, (b.angular_momentum - first.angular_momentum).norm());
-      P = std::max(P, b.momentum_scale);
-      H = std::max(H, b.angular_momentum_scale);
+      kept.add(b.kinetic + b.elastic + dissipated(i), std::abs(b.kinetic) + std::abs(b.elastic), b);
     }
-    s.energy_balance = energy > 0 ? gap / energy : 0;
-    if (!system_.fixed_hub() && !system_.field()) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
+    s.largest = kept.largest();
+    s.energy_balance = kept.energy_balance();
+    if (!system_.fixed_hub() && !system_.field()) s.momentum_drift = kept.momentum_drift();
   }
 
   const System& system_;

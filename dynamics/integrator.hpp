@@ -42,10 +42,11 @@ struct IntegrationSummary {
   long error_test_failures = 0;
   long restarts = 0;
   double seconds = 0;
-  double energy_balance = 0;       // max |E + dissipated - E0| / max E
-  double momentum_drift = 0;       // max change of linear and angular momentum, each over its scale; 0 in a field
-  double constraint_drift = 0;     // max | |quaternion| - 1 |; the joints are exact in relative coordinates
-  std::vector<StopHistory> stops;  // per hinge of a System, per joint of other scenes
+  double energy_balance = 0;        // max |E + dissipated - E0| / max E
+  double momentum_drift = unknown;  // max change of both momenta, each over its scale; unknown where they change
+  double constraint_drift = 0;      // max | |quaternion| - 1 |; the joints are exact in relative coordinates
+  MotionScales largest;             // what energy_balance and momentum_drift are relative to
+  std::vector<StopHistory> stops;   // per hinge of a System, per joint of other scenes
   bool interrupted = false;
 };
 

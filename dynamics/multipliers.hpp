@@ -71,7 +71,8 @@ struct MultipliersSummary {
   double angular_velocity_drift = 0;   // [rad/s]
   double quaternion_drift = 0;         // max | |p| - 1 |
   double energy_balance = 0;           // max |E + dissipated - work - E0| / max E
-  double momentum_drift = 0;           // of both momenta, each over its scale; 0 where something holds or pushes
+  double momentum_drift = unknown;     // of both momenta, each over its scale; unknown where something holds or pushes
+  MotionScales largest;                // what these two are relative to
   std::vector<std::string> redundant;  // constraint rows left out, by joint
   std::vector<StopHistory> stops;      // per joint
   bool interrupted = false;

@@ -1,7 +1,6 @@
 #include "dynamics/multipliers_balance.hpp"
 
-#include "dynamics/multipliers_scales.hpp"
-
+#include "dynamics/conservation.hpp"
 #include "dynamics/rotation.hpp"
 
 #include <algorithm>
@@ -44,31 +43,17 @@ Balance balance_of(const Equations& equations, const VectorXd& y, const JointMem
   return b;
 }
 
-bool is_held(const Multibody& scene) {
-  const auto grounded = [](const auto& pair) { return pair.a.body < 0 || pair.b.body < 0; };
-  return std::ranges::any_of(scene.joints, [&](const Joint& j) { return j.kind != JointKind::free && grounded(j); }) ||
-         std::ranges::any_of(scene.springs, grounded);
-}
-
-bool is_isolated(const Multibody& scene) { return scene.loads.empty() && scene.gravity.isZero(0) && !is_held(scene); }
-
-void set_drifts(const Multibody& scene, MultibodyTrajectory& r) {
-  MultipliersSummary& s = r.summary;
-  const Balance& first = r.balance.front();
-  double energy = 0, gap = 0, dP = 0, dH = 0, P = 0, H = 0;
+void set_drifts(const Multibody& scene, const MotionScales& before, MultibodyTrajectory& r) {
+  Conservation kept(scene.bodies, before);
   for (size_t i = 0; i < r.time.size(); ++i) {
     const Balance& b = r.balance[i];
-    const MultibodyState &at = r.states[i], &start = r.states.front();
-    energy = std::max({energy, std::abs(b.kinetic) + std::abs(b.elastic), std::abs(at.work), at.dissipated});
-    const double since = at.dissipated - start.dissipated - (at.work - start.work);
-    gap = std::max(gap, std::abs(b.kinetic + b.elastic - first.kinetic - first.elastic + since));
-    dP = std::max(dP, (b.momentum - first.momentum).norm());
-    dH = std::max(dH, (b.angular_momentum - first.angular_momentum).norm());
-    P = std::max(P, b.momentum_scale);
-    H = std::max(H, b.angular_momentum_scale);
+    const MultibodyState& at = r.states[i];
+    kept.add(b.kinetic + b.elastic + at.dissipated - at.work,
+             std::max({std::abs(b.kinetic) + std::abs(b.elastic), std::abs(at.work), at.dissipated}), b);
   }
-  s.energy_balance = energy > nothing * slow_energy(scene) ? gap / energy : 0;
-  if (is_isolated(scene)) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
+  r.summary.largest = kept.largest();
+  r.summary.energy_balance = kept.energy_balance();
+  if (is_isolated(scene)) r.summary.momentum_drift = kept.momentum_drift();
 }
 
 }  // namespace flexboom::redundant

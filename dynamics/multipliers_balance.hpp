@@ -9,13 +9,8 @@ namespace flexboom::redundant {
 /// Energies and momenta at y, those of wheels and of gravity too.
 Balance balance_of(const Equations&, const Eigen::VectorXd& y, const JointMemory&);
 
-/// Does something join bodies to the inertial frame?
-bool is_held(const Multibody&);
-
-/// Does nothing from outside push the bodies?
-bool is_isolated(const Multibody&);
-
-/// Largest drifts of energy and, where nothing pushes, of the momenta over the outputs.
-void set_drifts(const Multibody&, MultibodyTrajectory&);
+/// Largest drifts of energy and, where nothing pushes, of the momenta over the outputs. `before`: of a flight that this
+/// one goes on.
+void set_drifts(const Multibody&, const MotionScales& before, MultibodyTrajectory&);
 
 }  // namespace flexboom::redundant

@@ -449,7 +449,7 @@ class MultipliersFlight final : public DaeProblem {
     s.seconds = watch_.seconds();
     s.stops = history_;
     for (const size_t joint : stops_) s.stops[joint].closed = memory_.closed[joint] != 0;
-    set_drifts(scene_, result_);
+    set_drifts(scene_, options_.largest, result_);
   }
 
   Equations equations_;

@@ -1,6 +1,6 @@
 #include "dynamics/multipliers_frame.hpp"
 
-#include "dynamics/multipliers_balance.hpp"
+#include "dynamics/conservation.hpp"
 
 namespace flexboom::redundant {
 

@@ -1,5 +1,6 @@
 #include "dynamics/tree_integrator.hpp"
 
+#include "dynamics/conservation.hpp"
 #include "dynamics/ode.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
@@ -325,25 +326,14 @@ class TreeFlight {
   }
 
   void conservation(IntegrationSummary& s) const {
-    const TreeBalance& first = result_.balance.front();
-    double energy = 0, gap = 0, dP = 0, dH = 0, P = 0, H = 0;
-    for (const TreeBalance& b : result_.balance) {
-      energy = std::max({energy, b.kinetic + b.elastic, std::abs(b.work), b.dissipated});
-      gap = std::max(gap, std::abs(b.energy() - first.energy()));
-      dP = std::max(dP, (b.momentum - first.momentum).norm());
-      dH = std::max(dH, (b.angular_momentum - first.angular_momentum).norm());
-      P = std::max(P, b.momentum_scale), H = std::max(H, b.angular_momentum_scale);
-    }
-    s.energy_balance = energy > 0 ? gap / energy : 0;
-    if (flies_freely()) s.momentum_drift = std::max(P > 0 ? dP / P : 0, H > 0 ? dH / H : 0);
-  }
-
-  bool flies_freely() const {
-    const Multibody& scene = tree_.scene();
-    bool free = scene.gravity.isZero(0) && scene.loads.empty();
-    for (const Joint& j : scene.joints) free = free && (j.a.body >= 0 || j.kind == JointKind::free);
-    for (const SpringDamper& s : scene.springs) free = free && s.a.body >= 0 && s.b.body >= 0;
-    return free;
+    constexpr double digits = 1e-12;  // what is left of a potential energy that hardly changes
+    Conservation kept(tree_.scene().bodies, options_.largest);
+    for (const TreeBalance& b : result_.balance)
+      kept.add(b.energy(),
+               std::max({b.kinetic + b.elastic, std::abs(b.work), b.dissipated, digits * std::abs(b.potential)}), b);
+    s.largest = kept.largest();
+    s.energy_balance = kept.energy_balance();
+    if (is_isolated(tree_.scene())) s.momentum_drift = kept.momentum_drift();
   }
 
   void warn() {

@@ -13,7 +13,7 @@ struct TreeTrajectory {
   std::vector<Eigen::VectorXd> y;  // Tree::layout(), prescribed coordinates as prescribed
   std::vector<TreeBalance> balance;
   std::vector<Event> events;              // `hinge` is the joint
-  IntegrationSummary summary;             // momentum_drift: where nothing pushes from outside
+  IntegrationSummary summary;             // momentum_drift: unknown where something holds or pushes
   std::vector<double> stiffening_effect;  // per body: largest Tree::stiffening_effect at the outputs
   std::vector<std::string> warnings;
 };

@@ -1,6 +1,7 @@
 // A run that goes on from where another one ended is the same run.
 
 #include "tests/apps/run_testing.hpp"
+#include "tests/apps/scene_testing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -104,6 +105,66 @@ TEST_P(Continue, WheelsKeepTurning) {
     EXPECT_LT(difference(whole, later, name), 1e-3) << name;  // booms that shake by 1e-4 rad, at 1e-6
 }
 
+// What is left of a motion that has died is noise. Its balances are those of the whole flight.
+TEST_P(Continue, AfterTheMotionHasDied) {
+  for (const std::string& text :
+       {with(swing_on_hinge, "P2 = 0.02", "P2 = 1"), with(swing_on_joints, "damping = 0.02", "damping = 1")}) {
+    Scene scene = parse_scene(text, "dies.toml");
+    scene.formulation = GetParam();
+    scene.error_budget = false;
+    const RunResult first = fly(scene, 60), later = fly(scene, 61, &first), latest = fly(scene, 62, &later);
+    const double left = column(later, "energy.kinetic").maxCoeff();
+    EXPECT_LT(left, 1e-12 * column(first, "energy.kinetic").maxCoeff());
+    for (const RunResult* r : {&later, &latest}) {
+      EXPECT_TRUE(is_balanced(r->trajectory.summary)) << r->trajectory.summary.energy_balance;
+      EXPECT_LE(r->trajectory.summary.energy_balance, 1e-6);
+      EXPECT_LE(r->trajectory.summary.momentum_drift, 1e-6);
+      EXPECT_GE(r->end.largest.energy, first.end.largest.energy);
+    }
+  }
+}
+
+// A turn from rest to rest leaves nothing: no energy is in the dampers, and none in the wheels' work.
+TEST_P(Continue, AfterATurnFromRestToRest) {
+  Scene scene = parse_scene(R"(format = "flexboom-scene-1"
+name = "turn"
+duration = 4
+output_step = 0.05
+[[bodies]]
+name = "hub"
+mass = 8.5
+inertia = [0.13, 0.1, 0.06]
+[[joints]]
+name = "hub"
+kind = "free"
+b = { body = "hub" }
+[[wheels]]
+name = "wheel"
+body = "hub"
+inertia = 0.001
+torque = "0.01*sin(pi*t)*(t < 2)"
+)",
+                            "turn.toml");
+  scene.formulation = GetParam();
+  scene.error_budget = false;
+  const RunResult first = fly(scene, 2.5), later = fly(scene, 4, &first);
+  EXPECT_TRUE(is_balanced(later.trajectory.summary)) << later.trajectory.summary.energy_balance;
+  EXPECT_GE(later.end.largest.energy, column(first, "energy.kinetic").maxCoeff());
+}
+
+// Nothing has ever moved; and nothing but a shape moves, so that there are no momenta.
+TEST_P(Continue, NothingToBalance) {
+  for (std::string text : {with(swing_on_hinge, "start_angle = 1.5", "start_angle = 1.5707963267948966"),
+                           with(swing_on_joints, "start = 0.07", "start = 0")}) {
+    Scene scene = parse_scene(text, "rests.toml");
+    scene.formulation = GetParam();
+    scene.error_budget = false;
+    const RunResult r = fly(scene, 1);
+    EXPECT_EQ(r.trajectory.summary.energy_balance, 0);
+    EXPECT_EQ(r.trajectory.summary.momentum_drift, 0);
+  }
+}
+
 TEST(ContinueState, NamesEveryNumberOfAnotherScene) {
   const RunResult first = fly(scene_named("sport"), 0.1);
   Scene more = scene_named("sport");
@@ -134,6 +195,8 @@ TEST(ContinueState, BadFilesAreRefusedWithTheirPlace) {
       {replaced("time", "\"late\""), "time: "},
       {replaced("\"sip.gap\"", "nan"), "must be a finite number"},
       {replaced("\"sip.gap\"", "true"), "sip.gap"},
+      {replaced("energy", "-1.0"), "largest.energy: must not be negative"},
+      {replaced("angular_momentum", "inf"), "largest.angular_momentum: must be a finite number"},
       {replaced("\"sip.gap\"", "0.1\n\"sip.gab\" = 1.0"), "not of this scene: sip.gab"},
       {replaced("\"hub.attitude.w\"", "0.5"), "not of length 1"},
       {good.substr(0, good.find("[state]")), "state"},

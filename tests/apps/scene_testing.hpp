@@ -74,6 +74,53 @@ start_angle = 0.1
 start_rate = -0.1
 )";
 
+// One flexible boom that swings on a hub: a scene of [hub] and [[hinges]], and the same with [[joints]].
+inline const char* const swinging_boom = R"(format = "flexboom-scene-1"
+name = "swing"
+duration = 0.5
+output_step = 0.01
+[[bodies]]
+name = "boom"
+modes = 1
+damping = { rule = "modal", value = 0.05 }
+[[bodies.segments]]
+shape = "round-bar"
+diameter = 0.006
+length = 0.5
+material = { E = 70e9, nu = 0.33, rho = 2700 }
+)";
+
+inline const std::string swing_on_hinge = std::string(swinging_boom) + R"([hub]
+mass = 8.5
+inertia = [0.13, 0.1, 0.06]
+[[hinges]]
+body = "boom"
+point = [0.05, 0, 0]
+stowed = [0, 1, 0]
+outward = [1, 0, 0]
+stiffness = 1
+P2 = 0.02
+P3 = 0
+start_angle = 1.5
+)";
+
+inline const std::string swing_on_joints = std::string(swinging_boom) + R"([[bodies]]
+name = "hub"
+mass = 8.5
+inertia = [0.13, 0.1, 0.06]
+[[joints]]
+name = "hub"
+kind = "free"
+b = { body = "hub" }
+[[joints]]
+name = "hinge"
+a = { body = "hub", point = [0.05, 0, 0] }
+b = { body = "boom", marker = "root" }
+stiffness = 1
+damping = 0.02
+start = 0.07
+)";
+
 inline std::string with(std::string text, const std::string& from, const std::string& to) {
   const size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
