@@ -1,5 +1,6 @@
 #include "dynamics/multipliers.hpp"
 
+#include "dynamics/multibody_check.hpp"
 #include "dynamics/multipliers_start.hpp"
 #include "dynamics/rotation.hpp"
 #include "dynamics/second_order_shapes.hpp"
@@ -72,19 +73,11 @@ BodyData body_data(const ReducedBody& body, Stiffening stiffening) {
 
 namespace {
 
-PlaceData place_data(const Multibody& scene, const std::vector<Stiffening>& stiffening, const Place& place,
-                     const std::string& where) {
-  const int bodies = static_cast<int>(scene.bodies.size());
-  require(place.body >= -1 && place.body < bodies,
-          fmt::format("{}: body {} does not exist, there are 0 to {} and -1, the inertial frame", where, place.body,
-                      bodies - 1));
-  require((place.axes.transpose() * place.axes - Matrix3d::Identity()).norm() < 1e-10 && place.axes.determinant() > 0,
-          where + ": the axes of a place must be a rotation matrix");
+PlaceData place_data(const Multibody& scene, const std::vector<Stiffening>& stiffening, const Place& place) {
   PlaceData p;
   p.body = place.body;
   Vector3d position = place.position;
   if (!place.marker.empty()) {
-    require(place.body >= 0, where + ": the inertial frame has no markers");
     const ReducedBody& body = scene.bodies[static_cast<size_t>(place.body)];
     const Marker& m = marker(body, place.marker);
     position = m.position;
@@ -116,41 +109,19 @@ Multipliers::Multipliers(Multibody scene, std::vector<Stiffening> stiffening) : 
           "geometric stiffness: one choice for all bodies or one per body is needed");
   p.stiffening = std::move(stiffening);
   p.stiffening.resize(p.scene.bodies.size(), p.stiffening.front());
-  for (size_t i = 0; i < p.scene.bodies.size(); ++i) {
-    p.scene.bodies[i].validate();
-    p.bodies.push_back(body_data(p.scene.bodies[i], p.stiffening[i]));
-  }
+  check(p.scene);
+  for (size_t i = 0; i < p.scene.bodies.size(); ++i) p.bodies.push_back(body_data(p.scene.bodies[i], p.stiffening[i]));
   for (const Joint& j : p.scene.joints) {
-    const std::string where = fmt::format("joint \"{}\"", j.name);
-    JointData d{place_data(p.scene, p.stiffening, j.a, where + ", place a"),
-                place_data(p.scene, p.stiffening, j.b, where + ", place b"), joint_rows(j)};
-    require(d.a.body != d.b.body, where + ": both places are on one body");
+    JointData d{place_data(p.scene, p.stiffening, j.a), place_data(p.scene, p.stiffening, j.b), joint_rows(j)};
+    require(d.a.body != d.b.body, fmt::format("joint {}: both places are on one body", j.name));
     const HingeMechanism& m = j.mechanism;
-    const bool acts = m.stiffness != 0 || m.damping != 0 || m.stop_stiffness != 0;
-    d.mechanism = acts && (j.kind == JointKind::hinge || j.kind == JointKind::slider);
-    require(!acts || d.mechanism, where + ": only a hinge or a slider has a mechanism");
-    d.stop = d.mechanism && m.stop_stiffness > 0;
-    for (const TimeFunction& f : j.prescribed)
-      require(f.value && f.rate && f.acceleration,
-              where + ": a prescribed motion needs its value, rate and acceleration");
+    d.mechanism = m.stiffness != 0 || m.damping != 0 || m.stop_stiffness != 0;
+    d.stop = m.stop_stiffness > 0;
     p.joints.push_back(std::move(d));
   }
-  for (const SpringDamper& s : p.scene.springs) {
-    const std::string where = fmt::format("spring \"{}\"", s.name);
-    p.springs.push_back({place_data(p.scene, p.stiffening, s.a, where + ", place a"),
-                         place_data(p.scene, p.stiffening, s.b, where + ", place b"),
-                         {}});
-  }
-  for (const Load& l : p.scene.loads) {
-    p.loads.push_back(place_data(p.scene, p.stiffening, l.at, fmt::format("load \"{}\"", l.name)));
-    require(l.at.body >= 0, fmt::format("load \"{}\": it acts on the inertial frame", l.name));
-  }
-  for (const ReactionWheel& w : p.scene.wheels) {
-    const std::string where = fmt::format("wheel \"{}\"", w.name);
-    require(w.body >= 0 && w.body < static_cast<int>(p.scene.bodies.size()), where + ": its body does not exist");
-    require(w.inertia > 0, where + ": its inertia must be positive");
-    require(std::abs(w.axis.norm() - 1) < 1e-10, where + ": its axis must have length 1");
-  }
+  for (const SpringDamper& s : p.scene.springs)
+    p.springs.push_back({place_data(p.scene, p.stiffening, s.a), place_data(p.scene, p.stiffening, s.b), {}});
+  for (const Load& l : p.scene.loads) p.loads.push_back(place_data(p.scene, p.stiffening, l.at));
 }
 
 Multipliers::~Multipliers() = default;

@@ -3,6 +3,7 @@
 #include "dynamics/body_constants.hpp"
 #include "dynamics/hub_check.hpp"
 #include "dynamics/inner_loop.hpp"
+#include "dynamics/multibody_check.hpp"
 #include "dynamics/rotation.hpp"
 #include "dynamics/side_by_side.hpp"
 #include "dynamics/system_impl.hpp"
@@ -37,9 +38,7 @@ void check_hinge(const Hinge& h) {
   require(std::abs(h.stowed.norm() - 1) < tolerance && std::abs(h.outward.norm() - 1) < tolerance &&
               std::abs(h.stowed.dot(h.outward)) < tolerance,
           fmt::format("hinge {}: 'stowed' and 'outward' must be unit vectors normal to each other", h.name));
-  const HingeMechanism& m = h.mechanism;
-  require(m.stiffness >= 0 && m.damping >= 0 && m.stop_stiffness >= 0,
-          fmt::format("hinge {}: stiffness, damping and stop stiffness must not be negative", h.name));
+  check_mechanism(h.mechanism, "hinge " + h.name);
 }
 
 void pack_hinge(const Hinge& h, equations::Body& r) {

@@ -1,6 +1,7 @@
 #include "dynamics/tree_model.hpp"
 
 #include "dynamics/body_constants.hpp"
+#include "dynamics/multibody_check.hpp"
 #include "dynamics/second_order_shapes.hpp"
 #include "fem/check.hpp"
 
@@ -34,17 +35,6 @@ std::vector<Vec3<double>> columns(const Matrix3Xd& m) {
   std::vector<Vec3<double>> r;
   for (Eigen::Index k = 0; k < m.cols(); ++k) r.push_back(vec3(m.col(k)));
   return r;
-}
-
-void check_place(const Multibody& scene, const Place& place, const std::string& of) {
-  require(place.body >= -1 && place.body < std::ssize(scene.bodies),
-          fmt::format("{}: there is no body {}; there are 0 to {}, and -1 is the inertial frame", of, place.body,
-                      std::ssize(scene.bodies) - 1));
-  require((place.axes.transpose() * place.axes - Matrix3d::Identity()).norm() < 1e-12 && place.axes.determinant() > 0,
-          fmt::format("{}: the columns of its axes must be a right-handed orthonormal triad", of));
-  require(place.position.allFinite(), fmt::format("{}: its position is not finite", of));
-  require(place.body >= 0 || place.marker.empty(),
-          fmt::format("{}: the inertial frame has no marker '{}'; give a position", of, place.marker));
 }
 
 /// Where a place is in the undeformed BRF.
@@ -92,8 +82,6 @@ std::vector<int> carriers(const Multibody& scene) {
     require(!joint.closes_loop, fmt::format("joint {} closes a loop: a tree has none; such scenes need the formulation "
                                             "with multipliers",
                                             joint.name));
-    check_place(scene, joint.a, fmt::format("joint {}, place a", joint.name));
-    check_place(scene, joint.b, fmt::format("joint {}, place b", joint.name));
     require(joint.b.body >= 0, fmt::format("joint {}: its place b must be on a body, place a on the one nearer to the "
                                            "inertial frame",
                                            joint.name));
@@ -128,24 +116,6 @@ std::vector<int> order_of(const Multibody& scene, const std::vector<int>& carrie
   return order;
 }
 
-void check_mechanism(const Joint& joint) {
-  const HingeMechanism& m = joint.mechanism;
-  require(m.stiffness >= 0 && m.damping >= 0 && m.stop_stiffness >= 0,
-          fmt::format("joint {}: stiffness, damping and stop stiffness must not be negative", joint.name));
-  const bool may = joint.kind == JointKind::hinge || joint.kind == JointKind::slider;
-  require(may || (m.stiffness == 0 && m.damping == 0 && m.stop_stiffness == 0),
-          fmt::format("joint {}: a {} joint has no mechanism; hinges and sliders have", joint.name,
-                      joint_type(joint.kind).name));
-  const auto scalars = static_cast<size_t>(joint_type(joint.kind).scalars);
-  require(joint.prescribed.empty() || (scalars > 0 && joint.prescribed.size() == scalars),
-          fmt::format("joint {}: motion can be prescribed for a hinge, a slider (1 function) or a universal joint (2), "
-                      "it is given for a {} joint with {}",
-                      joint.name, joint_type(joint.kind).name, joint.prescribed.size()));
-  for (const TimeFunction& f : joint.prescribed)
-    require(f.value && f.rate && f.acceleration,
-            fmt::format("joint {}: a prescribed motion needs its value, rate and acceleration", joint.name));
-}
-
 void set_mechanism(const Joint& joint, Link& link) {
   const HingeMechanism& m = joint.mechanism;
   const bool has_one = joint.kind == JointKind::hinge || joint.kind == JointKind::slider;
@@ -171,7 +141,6 @@ void set_second_order(const SecondOrderShapes& body, const Vector3d& origin, con
 Link make_link(const Multibody& scene, int index, int joint_index, Stiffening stiffening) {
   const Joint& joint = scene.joints[static_cast<size_t>(joint_index)];
   const ReducedBody& body = scene.bodies[static_cast<size_t>(index)];
-  check_mechanism(joint);
   Link link;
   link.index = index;
   link.joint = joint_index;
@@ -234,18 +203,11 @@ void lay_out(const Multibody& scene, Model& model, TreeLayout& l) {
 
 void add_forces(const Multibody& scene, Model& model) {
   for (const Load& load : scene.loads) model.loads.push_back(packed_place(model, load.at, "load " + load.name));
-  for (const SpringDamper& s : scene.springs) {
-    require(s.stiffness >= 0 && s.damping >= 0 && s.free_length >= 0,
-            fmt::format("spring {}: stiffness, damping and free length must not be negative", s.name));
+  for (const SpringDamper& s : scene.springs)
     model.springs.push_back({packed_place(model, s.a, "spring " + s.name + ", place a"),
                              packed_place(model, s.b, "spring " + s.name + ", place b"), s.stiffness, s.free_length,
                              s.damping});
-  }
   for (const ReactionWheel& w : scene.wheels) {
-    require(w.body >= 0 && w.body < std::ssize(scene.bodies),
-            fmt::format("wheel {}: there is no body {}", w.name, w.body));
-    require(w.inertia > 0, fmt::format("wheel {}: its inertia {:g} must be positive", w.name, w.inertia));
-    require(std::abs(w.axis.norm() - 1) < 1e-12, fmt::format("wheel {}: its axis must be a unit vector", w.name));
     PlacedOn on = packed_place(model, {.body = w.body, .marker = {}}, "wheel " + w.name);
     const Link& link = model.links[static_cast<size_t>(on.link)];
     on.at.position = link.brf_axes * vec3(w.axis);
@@ -277,8 +239,7 @@ PlacedOn packed_place(const Model& model, const Place& place, const std::string&
 Model packed_model(const Multibody& scene, const std::vector<Stiffening>& stiffening, TreeLayout& layout) {
   require(stiffening.size() == 1 || stiffening.size() == scene.bodies.size(),
           "geometric stiffness: one choice for all bodies or one per body is needed");
-  require(scene.gravity.allFinite(), "the gravity is not finite");
-  for (const ReducedBody& body : scene.bodies) body.validate();
+  check(scene);
   const std::vector<int> carrier = carriers(scene), order = order_of(scene, carrier);
   Model model;
   model.scene = &scene;
