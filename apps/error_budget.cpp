@@ -6,45 +6,31 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <string_view>
 #include <utility>
 
 namespace flexboom {
 
 namespace {
 
-/// Geometric stiffness of spin is left out of Ke: its size against it, (Omega / omega_1)^2 of the body's first mode, at
-/// worst over the run.
-double linearisation_estimate(const Run& run) {
-  double worst = 0;
-  for (size_t b = 0; b < run.bodies.size(); ++b) {
-    const ReducedBody& body = run.bodies[b].body;
-    if (body.n() == 0) continue;
-    const double omega_1 = std::sqrt(body.Ke(0, 0) / body.Me(0, 0));
-    double spin = 0;
-    const auto rate =
-        std::find(run.outputs.names.begin(), run.outputs.names.end(), body.name + ".rate") - run.outputs.names.begin();
-    for (Eigen::Index row = 0; row < run.outputs.values.rows(); ++row) {
-      const double w = run.outputs.values.row(row).segment<3>(4).norm() + std::abs(run.outputs.values(row, rate));
-      spin = std::max(spin, w);
-    }
-    worst = std::max(worst, spin * spin / (omega_1 * omega_1));
-  }
-  return worst;
-}
-
-bool any_elastic(const Scene& scene, const char* structure) {
-  return std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const BodyScene& b) {
-    return b.modes > 0 && b.structure != "rigid" && (structure == nullptr || b.structure == structure);
+/// Does the model of any body leave elasticity or modes out? What is said to be rigid is.
+bool any_elastic(const Scene& scene, std::string_view structure = "") {
+  return std::ranges::any_of(scene.bodies, [&](const BodyScene& b) {
+    return b.is_boom() && b.structure != "rigid" && (structure.empty() || b.structure == structure);
   });
 }
 
-bool asked_to_stop(const RunHooks& hooks) { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
+/// The first body that was reduced before, from a model that has more to say.
+const BodyScene* any_reduced(const Scene& scene) {
+  const auto found = std::ranges::find_if(
+      scene.bodies, [](const BodyScene& b) { return b.reduced && b.reduced->structure != "rigid"; });
+  return found == scene.bodies.end() ? nullptr : &*found;
+}
 
 /// Two more modes in each plane, and both planes: what bends out of the hinge plane counts as left out, too.
 Scene with_more_modes(Scene scene) {
   for (BodyScene& b : scene.bodies) {
-    if (b.structure == "rigid" || b.modes == 0 || !b.is_boom()) continue;
+    if (b.structure == "rigid" || !b.is_boom()) continue;
     b.modes = b.directions == "all" ? b.modes + 4 : 2 * (b.modes + 2);
     b.directions = "all";
   }
@@ -59,68 +45,130 @@ OutputTable without_coordinates(const OutputTable& table) {
   return r;
 }
 
+/// What fills a budget.
+struct Measuring {
+  const RunHooks& hooks;
+  std::vector<std::string>& plan;
+  ErrorBudget budget;
+
+  bool stopped() const { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
+
+  double missing(std::string_view part, std::string_view why) {
+    budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
+    return unknown;
+  }
+
+  /// What `repeat` says; the run that is repeated outlives its failure.
+  template <class Repeat>
+  double measured(std::string_view part, const Repeat& repeat) {
+    try {
+      return repeat();
+    } catch (const std::runtime_error& e) {
+      return missing(part, e.what());
+    }
+  }
+};
+
 /// Repeats the run ten times tighter until the difference is within the tolerance; the tighter run then takes its
 /// place. Returns the difference. `flown` is the scene of the run that was kept.
-double settle_time_error(const Scene& scene, Scene& flown, Run& run, const RunHooks& hooks,
-                         std::vector<std::string>& plan) {
+double settle_time_error(const Scene& scene, Scene& flown, Run& run, Measuring& m) {
   constexpr int most = 3;
   for (int i = 1;; ++i) {
     Scene tight = flown;
     tight.tolerance /= 10;
-    Run finer = run_once(tight, hooks);
+    Run finer = run_once(tight, m.hooks);
     const double error = largest(compare_outputs(run.outputs, finer.outputs, scene.outputs));
-    if (error <= scene.tolerance || i == most || asked_to_stop(hooks) || tight.tolerance < 1e-13) return error;
+    if (error <= scene.tolerance || i == most || m.stopped() || tight.tolerance < 1e-13) return error;
     run = std::move(finer);
     flown = tight;
-    plan.push_back(fmt::format(
+    m.plan.push_back(fmt::format(
         "time integration: changed by {:.1e} at a tenth of the tolerance, so that run is the one kept (integrator "
         "tolerance {:.0e})",
         error, tight.tolerance));
   }
 }
 
-/// Difference of the outputs of another flight, or NaN with the reason in `plan` when it can not be flown at a bearable
-/// cost.
-double change(const Run& run, const Scene& other, int refine, const char* what, const RunHooks& hooks,
-              std::vector<std::string>& plan) {
+/// Difference of the outputs of another flight at a bearable cost.
+double change(const Run& run, const Scene& other, int refine, const RunHooks& hooks) {
   const long bearable = 20 * run.motion.summary.steps + 10000;
-  try {
-    const OutputTable repeated = without_coordinates(run_once(other, hooks, refine, bearable).outputs);
-    return largest(compare_outputs(without_coordinates(run.outputs), repeated, other.outputs));
-  } catch (const std::runtime_error& e) {
-    plan.push_back(fmt::format("error budget: {} not measured: {}", what, e.what()));
-    return std::numeric_limits<double>::quiet_NaN();
-  }
+  const OutputTable repeated = without_coordinates(run_once(other, hooks, refine, bearable).outputs);
+  return largest(compare_outputs(without_coordinates(run.outputs), repeated, other.outputs));
 }
 
 /// The modes left out, first with few digits: more only where the answer would drown in the error of time integration.
-double truncation_error(const Run& run, const Scene& flown, const RunHooks& hooks, std::vector<std::string>& plan) {
+double truncation_error(const Run& run, const Scene& flown, const RunHooks& hooks) {
   Scene more = with_more_modes(flown);
   more.tolerance = std::max(flown.tolerance, 1e-5);
-  const double error = change(run, more, 0, "truncation", hooks, plan);
+  const double error = change(run, more, 0, hooks);
   if (more.tolerance == flown.tolerance || !(error <= 10 * more.tolerance)) return error;
   more.tolerance = flown.tolerance;
-  return change(run, more, 0, "truncation", hooks, plan);
+  return change(run, more, 0, hooks);
+}
+
+/// With geometric stiffness in the equations of every body. Eq. 14 has none: its finite elements have.
+Scene with_stiffening(Scene scene) {
+  for (BodyScene& b : scene.bodies) {
+    if (b.rigid || b.structure == "rigid") continue;
+    b.stiffening = "on";
+    if (b.structure != "eq14") continue;
+    b.structure = "beam";
+    b.geometry.theory = BeamTheory::euler_bernoulli;
+    b.geometry.rotary_inertia = false;
+  }
+  if (!scene.is_tree) scene.tolerance = std::max(scene.tolerance / 10, 1e-12);  // by a method with larger errors
+  return scene;
+}
+
+/// What geometric stiffness changes where it is left out, and what then is left out still: of the order of the
+/// deflection squared.
+double linearisation_error(const Run& run, const Scene& flown, Measuring& m) {
+  bool left_out = false;
+  double deflection = 0;
+  for (size_t i = 0; i < run.bodies.size(); ++i) {
+    const ReducedBody& body = run.bodies[i].body;
+    if (body.n() == 0) continue;
+    if (flown.bodies[i].reduced && body.Kg.spin.empty())
+      return m.missing("linearisation", fmt::format("the file of body {} has no geometric stiffness", body.name));
+    left_out = left_out || !run.tree || run.tree->stiffening(static_cast<int>(i)) == Stiffening::off;
+    deflection = std::max(deflection, run.bending[i].of_length);
+  }
+  if (left_out && flown.from && !flown.is_tree)
+    return m.missing("linearisation", "a saved state of a hub is not one of the tree that has geometric stiffness");
+  if (left_out && flown.orbit && flown.orbit->gravity != "none")
+    return m.missing("linearisation", "equations with geometric stiffness have no gravity of an orbit");
+  return (left_out ? change(run, with_stiffening(flown), 0, m.hooks) : 0) + deflection * deflection;
 }
 
 }  // namespace
 
 ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
-  ErrorBudget budget;
+  Measuring m{hooks, plan, {}};
+  ErrorBudget& budget = m.budget;
   Scene flown = scene;
-  budget.time = settle_time_error(scene, flown, run, hooks, plan);
-  if (any_elastic(scene, nullptr) && !asked_to_stop(hooks)) {
-    if (scene.from) {
-      budget.truncation = std::numeric_limits<double>::quiet_NaN();
-      plan.emplace_back("error budget: truncation not measured: a saved state knows nothing of modes beyond its own");
-    } else {
-      budget.truncation = truncation_error(run, flown, hooks, plan);
-    }
+  const BodyScene* reduced = any_reduced(scene);
+  const std::string finished =
+      reduced ? fmt::format("body {} was reduced before, and its file has no more", reduced->name) : "";
+  budget.time = m.measured("time", [&] { return settle_time_error(scene, flown, run, m); });
+  if (!m.stopped()) {
+    if (reduced)
+      budget.truncation = m.missing("truncation", finished + " modes");
+    else if (scene.from && any_elastic(scene))
+      budget.truncation = m.missing("truncation", "a saved state knows nothing of modes beyond its own");
+    else
+      budget.truncation =
+          any_elastic(scene) ? m.measured("truncation", [&] { return truncation_error(run, flown, hooks); }) : 0;
   }
-  if (any_elastic(scene, "beam") && !asked_to_stop(hooks))
-    budget.discretisation = change(run, flown, 2, "discretisation", hooks, plan);
-  budget.linearisation = scene.is_tree ? run.stiffening_left_out : linearisation_estimate(run);
-  budget.measured = !asked_to_stop(hooks);
+  if (!m.stopped()) {
+    if (reduced && reduced->reduced->structure != "eq14")
+      budget.discretisation = m.missing("discretisation", finished + " elements");
+    else
+      budget.discretisation =
+          any_elastic(scene, "beam") ? m.measured("discretisation", [&] { return change(run, flown, 2, hooks); }) : 0;
+  }
+  if (!m.stopped())
+    budget.linearisation = m.measured("linearisation", [&] { return linearisation_error(run, flown, m); });
+  budget.measured = !m.stopped();
+  for (const std::string& line : budget.missing) plan.push_back("error budget: " + line);
   return budget;
 }
 
@@ -143,7 +191,7 @@ void choose_modes(Scene& scene, const RunHooks& hooks, std::vector<std::string>&
   OutputTable fewer = with_modes(1);
   for (int n = 1; n < most; ++n) {
     OutputTable more = with_modes(n + 1);
-    if (asked_to_stop(hooks)) return;
+    if (hooks.interrupt != nullptr && hooks.interrupt->load()) return;
     const double error = largest(compare_outputs(fewer, more, scene.outputs));
     if (error <= scene.tolerance) {
       set_modes(n);

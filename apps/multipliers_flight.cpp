@@ -113,31 +113,24 @@ TreeBalance balance_of(const Tree& tree, const MultibodyTrajectory& flight, size
 }
 
 /// At every output of a short list, at some of a long one.
-std::vector<double> largest_stiffening(const Multipliers& system, const MultibodyTrajectory& flight) {
-  std::vector<double> largest(system.multibody().bodies.size(), 0.0);
+std::vector<LargestStiffening> largest_stiffening(const Multipliers& system, const MultibodyTrajectory& flight) {
+  std::vector<LargestStiffening> largest(system.multibody().bodies.size());
   const size_t stride = flight.states.size() / 500 + 1;
-  for (size_t row = 0; row < flight.states.size(); row += stride) {
-    const std::vector<double> effect = stiffening_effect(system, flight.states[row]);
-    for (size_t b = 0; b < effect.size(); ++b) largest[b] = std::max(largest[b], effect[b]);
-  }
+  for (size_t row = 0; row < flight.states.size(); row += stride)
+    observe(stiffening_effect(system, flight.states[row]), flight.time[row], largest);
   return largest;
 }
 
-std::vector<std::string> warnings_of(const Scene& scene, const MultibodyTrajectory& flight,
-                                     const std::vector<double>& effect, const std::vector<Stiffening>& stiffening) {
-  std::vector<std::string> warnings;
+std::vector<std::string> warnings_of(const Scene& scene, const Multibody& bodies, const MultibodyTrajectory& flight,
+                                     const std::vector<LargestStiffening>& effect,
+                                     const std::vector<Stiffening>& stiffening) {
+  std::vector<std::string> warnings = stiffening_warnings(
+      bodies, effect, scene.tolerance, [&](int body) { return stiffening[static_cast<size_t>(body)]; });
   if (const auto& rows = flight.summary.redundant; !rows.empty())
     warnings.push_back(
         fmt::format("{} constraint rows follow from the others and are left out, so how these joints share such loads "
                     "is not determined: {}",
                     rows.size(), fmt::join(rows, "; ")));
-  for (size_t b = 0; b < effect.size(); ++b)
-    if (stiffening[b] == Stiffening::off && effect[b] > scene.tolerance)
-      warnings.push_back(
-          fmt::format("body {}: its geometric stiffness is left out; it reaches {:.2g} of its stiffness, more than the "
-                      "tolerance {:.2g}{}",
-                      scene.bodies[b].name, effect[b], scene.tolerance,
-                      effect[b] > 0.1 ? ": without it the motion can be wrong or diverge" : ""));
   return warnings;
 }
 
@@ -184,8 +177,7 @@ void set_flown(const FlownByMultipliers& f, size_t first, size_t last, const std
     return TreeMoment{f.flight.time[row], f.states[row], joint_loads(f.system, f.flight.states[row]),
                       balance_of(f.tree, f.flight, row, r.motion.y[i])};
   });
-  r.stiffening_left_out = largest_left_out(r.stiffening_effect, stiffening);
-  r.warnings = warnings_of(f.scene, f.flight, r.stiffening_effect, stiffening);
+  r.warnings = warnings_of(f.scene, f.system.multibody(), f.flight, r.stiffening_effect, stiffening);
   r.motion.events = events_of(f.flight.events, 0);
   r.motion.summary = summary_of(f.flight.summary);
   r.end = end_of(r, f.scene, f.flight.time.back(), f.y(f.states.size() - 1), r.motion.summary);
@@ -215,7 +207,7 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
   MultibodyTrajectory flight;
   std::vector<TreeState> states;
   size_t told = 0;
-  std::vector<double> effect;  // of the flight so far
+  std::vector<LargestStiffening> effect;  // of the flight so far
   Checkpoint<MultibodyTrajectory> checkpoint;
   if (hooks.checkpoint)
     checkpoint = [&](const MultibodyTrajectory& so_far, size_t outputs) {

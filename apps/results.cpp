@@ -140,7 +140,7 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   j["momentum_drift"] = s.momentum_drift;  // unknown is null
   j["constraint_drift"] = s.constraint_drift;
   j["error_budget"] = budget_json(r.budget);
-  j["accuracy_met"] = r.budget.measured ? ordered_json(r.budget.total() <= r.scene.tolerance) : ordered_json();
+  j["accuracy_met"] = r.budget.measured && r.budget.within(r.scene.tolerance);
   j["plan"] = r.plan;
   j["warnings"] = r.warnings;
   j["bodies"] = bodies_json(r);

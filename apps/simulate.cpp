@@ -1,5 +1,6 @@
 #include "apps/simulate.hpp"
 
+#include "apps/deflection.hpp"
 #include "apps/error_budget.hpp"
 #include "apps/multipliers_flight.hpp"
 #include "apps/tree_flight.hpp"
@@ -10,6 +11,7 @@
 #include "reduction/geometric_stiffness.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -182,7 +184,7 @@ std::vector<std::string> output_names(const Scene& scene, const System& system) 
 
 }  // namespace
 
-OutputTable output_table(const Scene& scene, const Flyable& f, const Trajectory& motion) {
+OutputTable output_table(const Scene& scene, const Flyable& f, const Trajectory& motion, Stiffening stiffening) {
   const System& system = f.system;
   OutputTable table{output_names(scene, system), {}};
   const auto rows = static_cast<Eigen::Index>(motion.time.size());
@@ -208,7 +210,9 @@ OutputTable output_table(const Scene& scene, const Flyable& f, const Trajectory&
       put(s.angle[b]);
       put(s.rate[b]);
       for (const double q : s.q[b]) put(q);
-      put_vector(system.tip_displacement(s, static_cast<int>(b)));
+      const ReducedBody& body = system.appendages()[b].body;
+      const Marker* tip = tip_of(body);
+      put_vector(tip ? displacement(body, *tip, s.q[b], stiffening) : Vector3d::Zero());
     }
     put(motion.balance[i].kinetic);
     put(motion.balance[i].elastic);
@@ -328,18 +332,14 @@ FlightState end_of(const Flyable& f, const std::vector<PreparedBody>& bodies, co
 
 }  // namespace
 
-Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_steps) {
+namespace {
+
+Run fly_hub(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
   const Stopwatch start;
   Run r;
-  for (const BodyScene& b : scene.bodies) r.bodies.push_back(prepare_body(b, refine));
-  const bool redundant = scene.formulation == "multipliers";
-  if (scene.is_tree) {
-    const double seconds = start.seconds();
-    Run flown = (redundant ? fly_by_multipliers : fly_tree)(scene, std::move(r.bodies), hooks, max_steps);
-    flown.prepare_seconds += seconds;
-    return flown;
-  }
+  r.bodies = std::move(bodies);
   const Flyable f = make_system(scene, r.bodies);
+  const bool redundant = scene.formulation == "multipliers";
   IntegratorOptions options = integrator_options(scene, hooks, redundant ? "ida" : "exponential", max_steps);
   VectorXd y = f.y0;
   if (scene.from) {
@@ -347,6 +347,8 @@ Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_ste
     options.stops = scene.from->stops(hinge_names(f.system));
   }
   r.prepare_seconds = start.seconds();
+  const bool stiffened = std::ranges::any_of(scene.bodies, [](const BodyScene& b) { return b.stiffening == "on"; });
+  const Stiffening stiffening = stiffened ? Stiffening::on : Stiffening::off;
   const Stopwatch watch;
   Checkpoint<Trajectory> checkpoint;
   size_t told = 0;
@@ -354,16 +356,75 @@ Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_ste
     checkpoint = [&](const Trajectory& so_far, size_t outputs) {
       Run part = r;
       part.motion = rows_of(so_far, told, outputs);
-      part.outputs = output_table(scene, f, part.motion);
+      part.outputs = output_table(scene, f, part.motion, stiffening);
       part.end = end_of(f, r.bodies, so_far);
       part.integrate_seconds = watch.seconds();
       hooks.checkpoint(std::move(part), std::exchange(told, outputs));
     };
-  r.motion = redundant ? integrate_by_multipliers(f.system, y, options, checkpoint)
-                       : integrate(f.system, y, options, checkpoint);
+  r.motion = stiffened   ? integrate_stiffened(f.system, y, options)
+             : redundant ? integrate_by_multipliers(f.system, y, options, checkpoint)
+                         : integrate(f.system, y, options, checkpoint);
   r.integrate_seconds = watch.seconds();
-  r.outputs = output_table(scene, f, r.motion);
+  r.outputs = output_table(scene, f, r.motion, stiffening);
   r.end = end_of(f, r.bodies, r.motion);
+  return r;
+}
+
+/// Does a boom of a hub turn so fast that its geometric stiffness may be as large as its own?
+bool spins_fast(const Run& run) {
+  constexpr double fast = 0.3;  // (Omega / omega_1)^2
+  const Eigen::MatrixXd& rows = run.outputs.values;
+  const auto hub = std::ranges::find(run.outputs.names, "hub.rate.x") - run.outputs.names.begin();
+  return std::ranges::any_of(run.bodies, [&](const PreparedBody& p) {
+    if (p.body.n() == 0) return false;
+    const auto rate = std::ranges::find(run.outputs.names, p.body.name + ".rate") - run.outputs.names.begin();
+    const double spin = (rows.middleCols<3>(hub).rowwise().norm() + rows.col(rate).cwiseAbs()).maxCoeff();
+    return spin * spin * p.body.Me(0, 0) > fast * p.body.Ke(0, 0);
+  });
+}
+
+/// The equations of a hub have no geometric stiffness; where it may matter its size is looked at.
+std::vector<std::string> softening_warnings(Scene scene, const Run& run) {
+  std::vector<PreparedBody> bodies;
+  for (BodyScene& b : scene.bodies) {
+    if (b.structure == "beam") b.stiffening = "on";
+    bodies.push_back(prepare_body(b));
+  }
+  const Flyable f = make_system(scene, bodies);
+  Multibody names;
+  for (const PreparedBody& p : bodies) names.bodies.push_back(p.body);
+  return stiffening_warnings(names, stiffening_of_hub(f.system, run.motion), scene.tolerance,
+                             [](int) { return Stiffening::off; });
+}
+
+/// Over the outputs, of long lists over some.
+std::vector<Bending> bending_of(const Run& run) {
+  std::vector<Bending> bending;
+  const Eigen::Index stride = run.outputs.values.rows() / 20000 + 1;
+  for (const PreparedBody& p : run.bodies) {
+    Bending& most = bending.emplace_back();
+    if (p.body.n() == 0) continue;
+    const Deflection deflection(p.body);
+    const auto first = std::ranges::find(run.outputs.names, p.body.name + ".q1") - run.outputs.names.begin();
+    for (Eigen::Index row = 0; row < run.outputs.values.rows(); row += stride) {
+      const double size = deflection.largest(run.outputs.values.row(row).segment(first, p.body.n()).transpose());
+      if (size > most.size) most = {size, size / deflection.length(), run.outputs.values(row, 0)};
+    }
+  }
+  return bending;
+}
+
+}  // namespace
+
+Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_steps) {
+  const Stopwatch start;
+  std::vector<PreparedBody> bodies;
+  for (const BodyScene& b : scene.bodies) bodies.push_back(prepare_body(b, refine));
+  const double seconds = start.seconds();
+  const auto fly = !scene.is_tree ? fly_hub : scene.formulation == "multipliers" ? fly_by_multipliers : fly_tree;
+  Run r = fly(scene, std::move(bodies), hooks, max_steps);
+  r.prepare_seconds += seconds;
+  r.bending = bending_of(r);
   return r;
 }
 
@@ -396,7 +457,7 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
   plan.push_back(scene.formulation == "multipliers" ? "formulation: redundant coordinates, joints by multipliers"
                                                     : "formulation: relative coordinates");
   if (scene.is_tree) return describe_tree(scene, run, plan);
-  plan.emplace_back("geometric stiffness: left out, its size is error_budget.linearisation");
+  plan.emplace_back("geometric stiffness: left out, what it changes is error_budget.linearisation");
   if (scene.orbit)
     plan.push_back(fmt::format("orbit: rate {:.6e} rad/s{}; differential gravity {}, {:.1e} 1/s^2", scene.orbit->rate(),
                                scene.orbit->J2 ? ", with J2" : "",
@@ -405,11 +466,24 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
 }
 
 /// What a user must not overlook.
-void add_warnings(RunResult& r) {
-  if (r.budget.measured && !(r.budget.total() <= r.scene.tolerance))
-    r.warnings.push_back(
-        fmt::format("the accuracy wanted, {:.1e}, was not reached or not proven: the errors add up to {:.1e}",
-                    r.scene.tolerance, r.budget.total()));
+void add_warnings(const Run& run, RunResult& r) {
+  constexpr double small = 0.1;  // of its length: beyond, shapes are no longer those of a straight body
+  for (size_t i = 0; i < run.bending.size(); ++i)
+    if (const Bending& b = run.bending[i]; b.of_length > small)
+      r.warnings.push_back(
+          fmt::format("body {}: it bends by {:.3g} m at t = {:.6g} s, {:.0f} % of its length: the theory "
+                      "of small deflections no longer holds",
+                      run.bodies[i].body.name, b.size, b.time, 100 * b.of_length));
+  r.warnings.insert(r.warnings.end(), run.warnings.begin(), run.warnings.end());
+  if (!r.scene.is_tree && spins_fast(run)) {
+    const std::vector<std::string> more = softening_warnings(r.scene, run);
+    r.warnings.insert(r.warnings.end(), more.begin(), more.end());
+  }
+  if (!r.budget.measured || r.budget.within(r.scene.tolerance)) return;
+  const std::string why = r.budget.missing.empty() ? fmt::format("the errors add up to {:.1e}", r.budget.total())
+                                                   : fmt::format("{}", fmt::join(r.budget.missing, "; "));
+  r.warnings.push_back(
+      fmt::format("the accuracy wanted, {:.1e}, was not reached or not proven: {}", r.scene.tolerance, why));
 }
 
 }  // namespace
@@ -423,7 +497,6 @@ void add_words(const Run& run, RunResult& r) {
                                  r.scene.from->file().string(), r.scene.from->time()));
   describe(r.scene, run, r.plan);
   r.warnings = r.scene.warnings;
-  r.warnings.insert(r.warnings.end(), run.warnings.begin(), run.warnings.end());
 }
 
 void take(Run run, RunResult& r) {
@@ -454,6 +527,7 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks,
     of_run.checkpoint = [&](Run run, size_t first) {
       RunResult part = r;
       add_words(run, part);
+      part.warnings.insert(part.warnings.end(), run.warnings.begin(), run.warnings.end());
       take(std::move(run), part);
       part.trajectory.summary.interrupted = false;  // not yet
       so_far(part, first);
@@ -471,7 +545,7 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks,
     r.budget = measure_budget(r.scene, run, hooks, r.plan);
     r.budget_seconds = start.seconds();
   }
-  add_warnings(r);
+  add_warnings(run, r);
   take(std::move(run), r);
   return r;
 }

@@ -3,7 +3,7 @@
 #include "apps/flight_state.hpp"
 #include "apps/scene.hpp"
 #include "dynamics/integrator.hpp"
-#include "dynamics/tree.hpp"
+#include "dynamics/tree_integrator.hpp"
 #include "reduction/inertia_invariants.hpp"
 
 #include <atomic>
@@ -31,13 +31,16 @@ struct PreparedBody {
 PreparedBody prepare_body(const BodyScene&, int refine = 0);
 
 /// Four separate errors of a run, each relative to the outputs wanted (README of apps: what each is compared with).
+/// What was not measured is unknown (NaN), and then so is the total.
 struct ErrorBudget {
-  double discretisation = 0;
-  double truncation = 0;
-  double time = 0;
-  double linearisation = 0;
-  bool measured = false;  // false: the repeats were not run; a part that could not be measured is NaN
+  double discretisation = unknown;
+  double truncation = unknown;
+  double time = unknown;
+  double linearisation = unknown;
+  std::vector<std::string> missing;  // which part was not measured and why, one line each
+  bool measured = false;             // false: the repeats were not run, or not to their end
   double total() const { return discretisation + truncation + time + linearisation; }
+  bool within(double tolerance) const { return total() <= tolerance; }
 };
 
 /// Names and values of the outputs of a run, one row per time: the columns of trajectory.csv.
@@ -87,19 +90,26 @@ RunResult run_scene(const Scene&, const RunHooks&,
 /// Do energy and momenta balance as well as any run must? If not, the motion is wrong whatever the tolerance was.
 bool is_balanced(const IntegrationSummary&);
 
+/// How far a body bends in a flight: the largest elastic displacement of any of its points.
+struct Bending {
+  double size = 0;       // [m]
+  double of_length = 0;  // by the length of the body
+  double time = 0;       // [s]
+};
+
 /// One flight of a scene as it stands.
 struct Run {
   std::vector<PreparedBody> bodies;
   Trajectory motion;
   OutputTable outputs;
   FlightState end;
+  std::vector<Bending> bending;  // per body
   double prepare_seconds = 0, integrate_seconds = 0;
 
   // Of a scene with joints; the states and events of `motion` are then those of the tree, its balance is empty.
   std::shared_ptr<const Tree> tree;
-  std::vector<double> stiffening_effect;  // per body: largest of its geometric stiffness against Ke
-  double stiffening_left_out = 0;         // the largest of those that are off
-  std::vector<std::string> notes;         // for the plan
+  std::vector<LargestStiffening> stiffening_effect;  // per body
+  std::vector<std::string> notes;                    // for the plan
   std::vector<std::string> warnings;
 };
 /// What a scene asks of an integrator; `chosen`: the method where it leaves the choice. `max_steps` as of run_once.
@@ -108,8 +118,9 @@ IntegratorOptions integrator_options(const Scene&, const RunHooks&, std::string_
 /// `max_steps` > 0 bounds its cost: NumericalError above.
 Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
 
-/// Columns of trajectory.csv, of a motion that began at the flyable's start or went on from there.
-OutputTable output_table(const Scene&, const Flyable&, const Trajectory&);
+/// Columns of trajectory.csv, of a motion that began at the flyable's start or went on from there. Tips move with their
+/// foreshortening where stiffening is on.
+OutputTable output_table(const Scene&, const Flyable&, const Trajectory&, Stiffening = Stiffening::off);
 
 /// Time, numbers and modes at the end of a flight; names and stops are for the caller.
 FlightState end_of(const std::vector<PreparedBody>&, double time, const Eigen::VectorXd& y, const MotionScales& largest);

@@ -3,6 +3,7 @@
 #include "apps/tree_flight.hpp"
 
 #include "apps/scene_keys.hpp"
+#include "dynamics/multibody_of.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
 
@@ -55,13 +56,28 @@ Place place_of(const Scene& scene, const PlaceScene& p) {
   return place;
 }
 
+/// A function of time of the scene, whose values must be numbers whenever an integrator asks. `of` says whose it is.
+std::function<double(double)> finite(std::function<double(double)> f, std::string of) {
+  return [f = std::move(f), of = std::move(of)](double t) {
+    const double value = f(t);
+    if (!std::isfinite(value))
+      throw NumericalError(
+          fmt::format("{} is {} at t = {:.9g} s: its function of time has no value there", of, value, t));
+    return value;
+  };
+}
+
+std::function<double(double)> function_of(const Scene& scene, const CourseScene& course, const std::string& of) {
+  return finite(course_of(course, scene.duration).function.value, of);
+}
+
 std::function<double(double)> negative(const std::function<double(double)>& f) {
   return [f](double t) { return -f(t); };
 }
 
 /// The drive of a hinge or a slider: along z of both places, opposite on a.
 void add_drive(const Scene& scene, const JointScene& j, Multibody& r) {
-  const std::function<double(double)> f = course_of(j.drive, scene.duration).function.value;
+  const std::function<double(double)> f = function_of(scene, j.drive, fmt::format("joint {}: drive", j.name));
   for (const bool on_b : {true, false}) {
     const PlaceScene& at = on_b ? j.b : j.a;
     if (at.body.empty()) continue;
@@ -81,7 +97,12 @@ Joint joint_of(const Scene& scene, const JointScene& j) {
   joint.b = place_of(scene, j.b);
   joint.mechanism = j.mechanism;
   joint.closes_loop = j.closes_loop;
-  for (const CourseScene& c : j.motion) joint.prescribed.push_back(course_of(c, scene.duration).function);
+  for (const CourseScene& c : j.motion) {
+    const TimeFunction f = course_of(c, scene.duration).function;
+    const std::string of = fmt::format("joint {}: motion", j.name);
+    joint.prescribed.push_back(
+        {finite(f.value, of), finite(f.rate, of + ", its rate,"), finite(f.acceleration, of + ", its acceleration,")});
+  }
   return joint;
 }
 
@@ -90,9 +111,12 @@ Load load_of(const Scene& scene, const LoadScene& l) {
   load.name = l.name;
   load.at = place_of(scene, l.at);
   load.inertial_axes = l.inertial_axes;
+  const auto function = [&](const CourseScene& c, const char* what, size_t i) {
+    return c.given() ? function_of(scene, c, fmt::format("load {}: {}[{}]", l.name, what, i)) : nullptr;
+  };
   for (size_t i = 0; i < 3; ++i) {
-    if (l.force[i].given()) load.force[i] = course_of(l.force[i], scene.duration).function.value;
-    if (l.torque[i].given()) load.torque[i] = course_of(l.torque[i], scene.duration).function.value;
+    load.force[i] = function(l.force[i], "force", i);
+    load.torque[i] = function(l.torque[i], "torque", i);
   }
   return load;
 }
@@ -105,7 +129,7 @@ ReactionWheel wheel_of(const Scene& scene, const WheelScene& w) {
   wheel.inertia = w.inertia;
   wheel.spin = w.spin;
   wheel.torque = [](double) { return 0.0; };
-  if (w.torque.given()) wheel.torque = course_of(w.torque, scene.duration).function.value;
+  if (w.torque.given()) wheel.torque = function_of(scene, w.torque, fmt::format("wheel {}: torque", w.name));
   return wheel;
 }
 
@@ -238,10 +262,9 @@ IntegratorOptions options_of(const Scene& scene, const Multibody& bodies, const 
 bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty(); }
 
 /// What results are made of.
-void set_flown(const Scene& scene, TreeTrajectory flight, const std::vector<Stiffening>& stiffening, Run& r) {
+void set_flown(const Scene& scene, TreeTrajectory flight, Run& r) {
   r.outputs = tree_output_table(scene, *r.tree, flight);
   r.stiffening_effect = flight.stiffening_effect;
-  r.stiffening_left_out = largest_left_out(r.stiffening_effect, stiffening);
   r.warnings = std::move(flight.warnings);
   r.motion.time = std::move(flight.time);
   r.motion.y = std::move(flight.y);
@@ -262,12 +285,12 @@ std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& bo
   return choice;
 }
 
-bool revise_stiffening(const Scene& scene, const Multibody& bodies, const std::vector<double>& effect,
+bool revise_stiffening(const Scene& scene, const Multibody& bodies, const std::vector<LargestStiffening>& effect,
                        std::vector<Stiffening>& choice) {
   bool changed = false;
   for (size_t i = 0; i < choice.size(); ++i) {
     const bool wanted =
-        scene.bodies[i].stiffening == "auto" && has_stiffening(bodies.bodies[i]) && effect[i] > scene.tolerance;
+        scene.bodies[i].stiffening == "auto" && has_stiffening(bodies.bodies[i]) && effect[i].size > scene.tolerance;
     if (!wanted || choice[i] == Stiffening::on) continue;
     choice[i] = Stiffening::on;
     changed = true;
@@ -275,15 +298,15 @@ bool revise_stiffening(const Scene& scene, const Multibody& bodies, const std::v
   return changed;
 }
 
-bool will_be_revised(const Scene& scene, const Multibody& bodies, const std::vector<double>& effect,
+bool will_be_revised(const Scene& scene, const Multibody& bodies, const std::vector<LargestStiffening>& effect,
                      std::vector<Stiffening> choice) {
   return revise_stiffening(scene, bodies, effect, choice);
 }
 
-void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<double>& effect,
+void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<LargestStiffening>& effect,
                        std::vector<Stiffening>& choice, const std::function<bool()>& fly) {
   for (bool again = true; again;) {
-    effect.assign(choice.size(), 0.0);
+    effect.assign(choice.size(), {});
     try {
       const bool interrupted = fly();
       again = !interrupted && revise_stiffening(scene, bodies, effect, choice);
@@ -291,13 +314,6 @@ void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<
       if (!revise_stiffening(scene, bodies, effect, choice)) throw;
     }
   }
-}
-
-double largest_left_out(const std::vector<double>& effect, const std::vector<Stiffening>& choice) {
-  double worst = 0;
-  for (size_t i = 0; i < effect.size(); ++i)
-    if (choice[i] == Stiffening::off) worst = std::max(worst, effect[i]);
-  return worst;
 }
 
 Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
@@ -311,7 +327,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   r.prepare_seconds = start.seconds();
   const Stopwatch flight_time;
   size_t told = 0;
-  std::vector<double> effect;  // of the flight so far
+  std::vector<LargestStiffening> effect;  // of the flight so far
   Checkpoint<TreeTrajectory> checkpoint;
   if (hooks.checkpoint)
     checkpoint = [&](const TreeTrajectory& so_far, size_t outputs) {
@@ -320,7 +336,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
       Run part = r;
       TreeTrajectory rows = rows_of(so_far, told, outputs);
       rows.stiffening_effect = so_far.stiffening_effect, rows.warnings = so_far.warnings;
-      set_flown(scene, std::move(rows), stiffening, part);
+      set_flown(scene, std::move(rows), part);
       part.end = end_of(part, scene, so_far.time.back(), so_far.y.back(), so_far.summary);
       part.integrate_seconds = flight_time.seconds();
       hooks.checkpoint(std::move(part), std::exchange(told, outputs));
@@ -335,9 +351,54 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   };
   fly_until_settled(scene, multibody, effect, stiffening, fly);
   r.end = end_of(r, scene, flight.time.back(), flight.y.back(), flight.summary);
-  set_flown(scene, std::move(flight), stiffening, r);
+  set_flown(scene, std::move(flight), r);
   r.integrate_seconds = flight_time.seconds();
   return r;
+}
+
+namespace {
+
+/// The state of a hub's tree, without energies. Up to them both have the same numbers.
+VectorXd on_tree(const System& of_hub, const Tree& tree, const VectorXd& y) {
+  const Eigen::Index motion = of_hub.layout().dissipated();
+  VectorXd r = VectorXd::Zero(tree.layout().size);
+  r.head(motion) = y.head(motion);
+  return r;
+}
+
+}  // namespace
+
+Trajectory integrate_stiffened(const System& of_hub, const VectorXd& start, IntegratorOptions options) {
+  const Multibody bodies = multibody_of(of_hub);
+  std::vector<Stiffening> stiffening;
+  for (const ReducedBody& b : bodies.bodies) stiffening.push_back(has_stiffening(b) ? Stiffening::on : Stiffening::off);
+  const Tree tree(bodies, stiffening);
+  options.method = "bdf";
+  TreeTrajectory flight = integrate(tree, on_tree(of_hub, tree, start), options);
+  Trajectory r;
+  for (const VectorXd& y : flight.y) {
+    VectorXd& row = r.y.emplace_back(VectorXd::Zero(of_hub.layout().size));
+    row.head(of_hub.layout().dissipated()) = y.head(of_hub.layout().dissipated());
+    r.balance.emplace_back();
+  }
+  r.time = std::move(flight.time);
+  return r;
+}
+
+std::vector<LargestStiffening> stiffening_of_hub(const System& of_hub, const Trajectory& motion) {
+  const Tree tree(multibody_of(of_hub));
+  const size_t first = of_hub.fixed_hub() ? 0 : 1;  // joint that is a hinge, body that is a boom
+  std::vector<LargestStiffening> largest(tree.scene().bodies.size());
+  std::vector<char> contact(tree.scene().joints.size(), 0);
+  const size_t stride = motion.y.size() / 500 + 1;
+  for (size_t row = 0; row < motion.y.size(); row += stride) {
+    for (size_t i = first; i < contact.size(); ++i)
+      contact[i] = of_hub.gap(motion.y[row].data(), static_cast<int>(i - first)) > 0;
+    observe(tree.stiffening_effect(motion.time[row], on_tree(of_hub, tree, motion.y[row]), contact), motion.time[row],
+            largest);
+  }
+  largest.erase(largest.begin(), largest.begin() + static_cast<std::ptrdiff_t>(first));
+  return largest;
 }
 
 }  // namespace flexboom

@@ -32,18 +32,15 @@ PreparedBody prepare_reduced(const BodyScene&);
 std::vector<Stiffening> first_stiffening(const Scene&, const Multibody&);
 
 /// Turns on what a flight showed to count: `effect` per body. Was there any?
-bool revise_stiffening(const Scene&, const Multibody&, const std::vector<double>& effect, std::vector<Stiffening>&);
+bool revise_stiffening(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect, std::vector<Stiffening>&);
 
 /// Would that turn on any? Then the flight that showed it is not worth keeping.
-bool will_be_revised(const Scene&, const Multibody&, const std::vector<double>& effect, std::vector<Stiffening>);
+bool will_be_revised(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect, std::vector<Stiffening>);
 
 /// Flies until no flight shows more that counts; one that fails without it is flown again with it. `fly` sets `effect`
 /// and says whether it was interrupted. @throws NumericalError as `fly`.
-void fly_until_settled(const Scene&, const Multibody&, std::vector<double>& effect, std::vector<Stiffening>&,
+void fly_until_settled(const Scene&, const Multibody&, std::vector<LargestStiffening>& effect, std::vector<Stiffening>&,
                        const std::function<bool()>& fly);
-
-/// Of the bodies where it is off.
-double largest_left_out(const std::vector<double>& effect, const std::vector<Stiffening>&);
 
 /// One flight of a scene with joints. Geometric stiffness "auto" is on where it exceeds the tolerance at the start,
 /// under the prescribed motions, or (then the flight is repeated with it) at any output.
@@ -71,5 +68,12 @@ void describe_tree(const Scene&, const Run&, std::vector<std::string>& plan);
 
 /// Boxes of rigid bodies and deformed flexible ones at a row of the run, inertial axes.
 VtkGrid tree_picture(const RunResult&, size_t row);
+
+/// The flight of a hub with geometric stiffness in the equations of its bodies, which those of a System leave out.
+/// Gravity of an orbit is left out; energies are not measured.
+Trajectory integrate_stiffened(const System& of_hub, const Eigen::VectorXd& start, IntegratorOptions);
+
+/// The geometric stiffness of its bodies in a flight of a hub without it.
+std::vector<LargestStiffening> stiffening_of_hub(const System& of_hub, const Trajectory&);
 
 }  // namespace flexboom

@@ -1,5 +1,6 @@
 // Outputs of a scene with joints: columns of trajectory.csv, lines of the plan.
 
+#include "apps/deflection.hpp"
 #include "apps/tree_flight.hpp"
 #include "dynamics/rotation.hpp"
 
@@ -63,19 +64,6 @@ void put_load(Columns& out, const JointScene& joint, const JointLoad& load) {
     out.put(fmt::format("{}.drive{}", joint.name, i), load.drive[i - 1]);
 }
 
-/// Elastic displacement of the tip, BRF [m]: S q, and what geometric stiffness adds of second order, -1/2 q^T Kf q.
-Vector3d tip_displacement(const ReducedBody& body, const VectorXd& q, Stiffening stiffening) {
-  const auto tip =
-      std::find_if(body.markers.begin(), body.markers.end(), [](const Marker& m) { return m.name == "tip"; });
-  if (tip == body.markers.end() || q.size() == 0) return Vector3d::Zero();
-  Vector3d u = tip->S * q;
-  if (stiffening == Stiffening::off) return u;
-  for (const MarkerStiffness& k : body.Kg.markers)
-    for (size_t i = 0; k.marker == "tip" && i < k.force.size(); ++i)
-      u[static_cast<Eigen::Index>(i)] -= 0.5 * q.dot(k.force[i] * q);
-  return u;
-}
-
 std::vector<char> closed_stops(const Tree& tree, const VectorXd& y) {
   std::vector<char> contact(tree.scene().joints.size(), 0);
   for (const int joint : tree.stops()) contact[static_cast<size_t>(joint)] = tree.gap(y.data(), joint) > 0;
@@ -127,8 +115,9 @@ OutputTable tree_output_table(const Scene& scene, const Tree& tree, size_t rows,
     for (size_t b = 0; b < scene.bodies.size(); ++b) {
       const std::string& name = scene.bodies[b].name;
       for (Eigen::Index k = 0; k < s.q[b].size(); ++k) out.put(fmt::format("{}.q{}", name, k + 1), s.q[b][k]);
-      if (s.q[b].size() > 0)
-        out.put(name + ".tip", tip_displacement(tree.scene().bodies[b], s.q[b], tree.stiffening(static_cast<int>(b))));
+      const ReducedBody& body = tree.scene().bodies[b];
+      if (const Marker* tip = body.n() > 0 ? tip_of(body) : nullptr)
+        out.put(name + ".tip", displacement(body, *tip, s.q[b], tree.stiffening(static_cast<int>(b))));
     }
     for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name + ".spin", s.spin[w]);
     pointing.put(out, now.time, s);
@@ -161,13 +150,15 @@ void describe_tree(const Scene& scene, const Run& run, std::vector<std::string>&
       plan.push_back(fmt::format("{}: reduced body of {}, {} coordinates; its own truncation is not measured", b.name,
                                  b.reduced_file.string(), run.bodies[i].body.n()));
     if (run.bodies[i].body.n() == 0) continue;
+    if (!tip_of(run.bodies[i].body))
+      plan.push_back(fmt::format("{0}: no output {0}.tip: {1}", b.name, no_tip(run.bodies[i].body)));
     const bool known = !run.bodies[i].body.Kg.spin.empty();
     const bool on = run.tree->stiffening(static_cast<int>(i)) == Stiffening::on;
     plan.push_back(
         known ? fmt::format(
                     "{}: geometric stiffness {} (stiffening = \"{}\"): its effect reaches {:.2g} of the stiffness of "
                     "the body",
-                    b.name, on ? "on" : "off", b.stiffening, run.stiffening_effect[i])
+                    b.name, on ? "on" : "off", b.stiffening, run.stiffening_effect[i].size)
               : fmt::format("{}: geometric stiffness unknown and left out ({}); its effect is not measured", b.name,
                             b.reduced ? "not in the file" : "structure \"eq14\""));
   }

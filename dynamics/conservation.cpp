@@ -5,11 +5,11 @@ namespace flexboom {
 namespace {
 
 /// Energy of bodies that turn by a hundredth of a radian per second, by 1e-20: nothing moves.
-double round_off(double inertia) { return 1e-20 * 0.5e-4 * inertia; }
+double no_motion(double inertia) { return 1e-20 * 0.5e-4 * inertia; }
 
 /// By what the momenta are judged at least: the share of those that all the energy could make. A body that only
 /// vibrates has none.
-constexpr double share = 1e-6;
+constexpr double least_share = 1e-6;
 
 double sum_of(const std::vector<ReducedBody>& bodies, double (*part)(const ReducedBody&)) {
   double sum = 0;
@@ -35,13 +35,13 @@ Conservation::Conservation(const std::vector<ReducedBody>& bodies, const MotionS
                    sum_of(bodies, [](const ReducedBody& b) { return b.J0.trace(); }), before) {}
 
 double Conservation::energy_balance() const {
-  return largest_.energy > round_off(inertia_) ? gap_ / largest_.energy : 0;
+  return largest_.energy > no_motion(inertia_) ? gap_ / largest_.energy : 0;
 }
 
 double Conservation::momentum_drift() const {
-  if (!(largest_.energy > round_off(inertia_))) return 0;
-  const double P = std::max(largest_.momentum, share * std::sqrt(2 * mass_ * largest_.energy));
-  const double H = std::max(largest_.angular_momentum, share * std::sqrt(2 * inertia_ * largest_.energy));
+  if (!(largest_.energy > no_motion(inertia_))) return 0;
+  const double P = std::max(largest_.momentum, least_share * std::sqrt(2 * mass_ * largest_.energy));
+  const double H = std::max(largest_.angular_momentum, least_share * std::sqrt(2 * inertia_ * largest_.energy));
   return std::max(P > 0 ? dP_ / P : 0, H > 0 ? dH_ / H : 0);
 }
 

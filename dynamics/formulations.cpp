@@ -136,7 +136,7 @@ std::vector<JointLoad> joint_loads(const Multipliers& system, const MultibodySta
   return loads;
 }
 
-std::vector<double> stiffening_effect(const Multipliers& system, const MultibodyState& s) {
+std::vector<StiffeningEffect> stiffening_effect(const Multipliers& system, const MultibodyState& s) {
   const Prepared& p = system.impl();
   std::vector<MatrixXd> K;
   std::vector<Matrix3d> A;
@@ -158,8 +158,8 @@ std::vector<double> stiffening_effect(const Multipliers& system, const Multibody
     push(p.scene.joints[i].b, force, torque);
     push(p.scene.joints[i].a, -force, -torque - (pair.b.position - pair.a.position).cross(force));
   }
-  std::vector<double> effect;
-  for (size_t i = 0; i < K.size(); ++i) effect.push_back(relative_stiffness(p.scene.bodies[i], K[i]));
+  std::vector<StiffeningEffect> effect;
+  for (size_t i = 0; i < K.size(); ++i) effect.push_back(stiffening_effect(p.scene.bodies[i], K[i]));
   return effect;
 }
 

@@ -68,6 +68,15 @@ struct TreeBalance {
   double momentum_scale = 0, angular_momentum_scale = 0;  // sums over the bodies of the norms
 };
 
+/// Size of the geometric stiffness of a body against its Ke in some state.
+struct StiffeningEffect {
+  double size = 0;       // the largest |eigenvalue| of Kg(omega, a, alpha, joint forces) in the metric of Ke
+  double softening = 0;  // what it takes from Ke: at 1 a shape has no stiffness left
+};
+
+/// 0 where the body has no Kg.
+StiffeningEffect stiffening_effect(const ReducedBody&, const Eigen::MatrixXd& Kg);
+
 /// What joint i exerts on its place b, axes of b; the opposite acts on a.
 struct JointLoad {
   Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();  // [N], [N m]
@@ -124,10 +133,9 @@ class Tree {
   std::vector<JointLoad> joint_loads(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
                                      std::span<const char> contact) const;
 
-  /// Size of the geometric stiffness of a body against its Ke in this state: the largest |eigenvalue| of Kg(omega, a,
-  /// alpha, joint forces) in the metric of Ke; 0 where the body has no Kg.
-  std::vector<double> stiffening_effect(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
-                                        std::span<const char> contact) const;
+  /// Of each body.
+  std::vector<StiffeningEffect> stiffening_effect(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
+                                                  std::span<const char> contact) const;
 
  private:
   struct Impl;

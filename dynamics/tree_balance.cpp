@@ -160,8 +160,13 @@ MatrixXd stiffness_of_motion(const ReducedBody& body, const tree::Link& link, co
 
 }  // namespace
 
-std::vector<double> Tree::stiffening_effect(double t, const Eigen::Ref<const VectorXd>& y,
-                                            std::span<const char> contact) const {
+StiffeningEffect stiffening_effect(const ReducedBody& body, const MatrixXd& Kg) {
+  const auto [least, most] = relative_stiffness(body, Kg);
+  return {std::max(-least, most), std::max(-least, 0.0)};
+}
+
+std::vector<StiffeningEffect> Tree::stiffening_effect(double t, const Eigen::Ref<const VectorXd>& y,
+                                                      std::span<const char> contact) const {
   const tree::Model& model = impl_->model;
   const TreeWorkspaceHandle work = evaluated(*this, model, t, y, contact);
   std::vector<MatrixXd> K(impl_->scene.bodies.size());
@@ -179,8 +184,8 @@ std::vector<double> Tree::stiffening_effect(double t, const Eigen::Ref<const Vec
                          impl_->scene.joints[static_cast<size_t>(link.joint)].a.marker,
                          eigen(transposed_product(parent.brf_axes, F)), eigen(transposed_product(parent.brf_axes, M)));
   }
-  std::vector<double> effect;
-  for (size_t i = 0; i < K.size(); ++i) effect.push_back(relative_stiffness(impl_->scene.bodies[i], K[i]));
+  std::vector<StiffeningEffect> effect;
+  for (size_t i = 0; i < K.size(); ++i) effect.push_back(flexboom::stiffening_effect(impl_->scene.bodies[i], K[i]));
   return effect;
 }
 

@@ -103,7 +103,7 @@ class TreeFlight {
     const size_t stops = tree.stops().size();
     closed_.assign(stops, 0), armed_.assign(stops, 1), crossed_.assign(stops, 0), approach_.resize(stops);
     result_.summary.method = method.name;
-    result_.stiffening_effect.assign(tree.scene().bodies.size(), 0.0);
+    result_.stiffening_effect.resize(tree.scene().bodies.size());
     for (const int joint : tree.stops()) scales_.raise(scalar(joint), history_[static_cast<size_t>(joint)].largest_gap);
     contacts_at_start();
   }
@@ -215,9 +215,7 @@ class TreeFlight {
     if (result_.time.size() % stride != 0) return;
     std::vector<char> contact(tree_.scene().joints.size(), 0);
     for (size_t i = 0; i < closed_.size(); ++i) contact[static_cast<size_t>(tree_.stops()[i])] = closed_[i];
-    const std::vector<double> effect = tree_.stiffening_effect(t, y, contact);
-    for (size_t b = 0; b < effect.size(); ++b)
-      result_.stiffening_effect[b] = std::max(result_.stiffening_effect[b], effect[b]);
+    observe(tree_.stiffening_effect(t, y, contact), t, result_.stiffening_effect);
   }
 
   bool switch_contacts() {
@@ -322,7 +320,8 @@ class TreeFlight {
     for (size_t i = 0; i < closed_.size(); ++i) s.stops[static_cast<size_t>(tree_.stops()[i])].closed = closed_[i] != 0;
     if (s.interrupted && result_.time.back() < t_) record(t_, y_);
     conservation(s);
-    warn();
+    result_.warnings = stiffening_warnings(tree_.scene(), result_.stiffening_effect, options_.tolerance,
+                                           [this](int body) { return tree_.stiffening(body); });
   }
 
   void conservation(IntegrationSummary& s) const {
@@ -334,18 +333,6 @@ class TreeFlight {
     s.largest = kept.largest();
     s.energy_balance = kept.energy_balance();
     if (is_isolated(tree_.scene())) s.momentum_drift = kept.momentum_drift();
-  }
-
-  void warn() {
-    for (size_t b = 0; b < result_.stiffening_effect.size(); ++b) {
-      const double effect = result_.stiffening_effect[b];
-      if (effect <= options_.tolerance || tree_.stiffening(static_cast<int>(b)) == Stiffening::on) continue;
-      result_.warnings.push_back(
-          fmt::format("body {}: its geometric stiffness is off; it reaches {:.2g} of its stiffness, more than the "
-                      "tolerance {:.2g}{}",
-                      tree_.scene().bodies[b].name, effect, options_.tolerance,
-                      effect > 0.1 ? ": without it the motion can be wrong or diverge" : ""));
-    }
   }
 
   const Tree& tree_;
@@ -370,6 +357,33 @@ class TreeFlight {
 
 }  // namespace
 
+void observe(const std::vector<StiffeningEffect>& effect, double t, std::vector<LargestStiffening>& largest) {
+  for (size_t b = 0; b < effect.size(); ++b) {
+    largest[b].size = std::max(largest[b].size, effect[b].size);
+    if (effect[b].softening > largest[b].softening) largest[b].softening = effect[b].softening, largest[b].time = t;
+  }
+}
+
+std::vector<std::string> stiffening_warnings(const Multibody& scene, const std::vector<LargestStiffening>& effect,
+                                             double tolerance, const std::function<Stiffening(int body)>& stiffening) {
+  std::vector<std::string> warnings;
+  for (size_t b = 0; b < effect.size(); ++b) {
+    const std::string& name = scene.bodies[b].name;
+    if (effect[b].size > tolerance && stiffening(static_cast<int>(b)) == Stiffening::off)
+      warnings.push_back(
+          fmt::format("body {}: its geometric stiffness is off; it reaches {:.2g} of its stiffness, more than the "
+                      "tolerance {:.2g}{}",
+                      name, effect[b].size, tolerance,
+                      effect[b].size > 0.1 ? ": without it the motion can be wrong or diverge" : ""));
+    if (effect[b].softening > 1)
+      warnings.push_back(
+          fmt::format("body {}: at t = {:.6g} s its geometric stiffness takes {:.2g} of its stiffness "
+                      "away: it buckles, and what follows is beyond the theory",
+                      name, effect[b].time, effect[b].softening));
+  }
+  return warnings;
+}
+
 TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o,
                          const Checkpoint<TreeTrajectory>& so_far) {
   check_options(o, tree.scene().joints.size());
@@ -389,9 +403,9 @@ std::vector<Stiffening> stiffening_where_it_counts(const Multibody& scene, const
   for (int i = 0; i <= samples; ++i) {
     const double t = duration * i / samples;
     tree.impose(t, y);
-    const std::vector<double> effect = tree.stiffening_effect(t, y, open);
+    const std::vector<StiffeningEffect> effect = tree.stiffening_effect(t, y, open);
     for (size_t b = 0; b < effect.size(); ++b)
-      if (effect[b] > tolerance) choice[b] = Stiffening::on;
+      if (effect[b].size > tolerance) choice[b] = Stiffening::on;
   }
   return choice;
 }

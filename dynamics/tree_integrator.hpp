@@ -3,24 +3,36 @@
 #include "dynamics/integrator.hpp"
 #include "dynamics/tree.hpp"
 
+#include <functional>
 #include <string>
 #include <vector>
 
 namespace flexboom {
 
+/// The largest StiffeningEffect of a body in a flight.
+struct LargestStiffening {
+  double size = 0, softening = 0;
+  double time = 0;  // of the largest softening [s]
+};
+void observe(const std::vector<StiffeningEffect>&, double t, std::vector<LargestStiffening>&);
+
+/// Names each body whose geometric stiffness is off although its effect exceeds the tolerance, or takes all stiffness
+/// away.
+std::vector<std::string> stiffening_warnings(const Multibody&, const std::vector<LargestStiffening>&, double tolerance,
+                                             const std::function<Stiffening(int body)>&);
+
 struct TreeTrajectory {
   std::vector<double> time;
   std::vector<Eigen::VectorXd> y;  // Tree::layout(), prescribed coordinates as prescribed
   std::vector<TreeBalance> balance;
-  std::vector<Event> events;              // `hinge` is the joint
-  IntegrationSummary summary;             // momentum_drift: unknown where something holds or pushes
-  std::vector<double> stiffening_effect;  // per body: largest Tree::stiffening_effect at the outputs
+  std::vector<Event> events;                         // `hinge` is the joint
+  IntegrationSummary summary;                        // momentum_drift: unknown where something holds or pushes
+  std::vector<LargestStiffening> stiffening_effect;  // per body, at the outputs
   std::vector<std::string> warnings;
 };
 
 /// Flies the tree from y0 with CVODE: "bdf" or "adams" (default where the options name the default of System).
 /// `rescale_at_events` is not heard: errors are measured against the largest motion so far.
-/// A body whose geometric stiffness is off although its effect exceeds the tolerance is named in the warnings.
 /// @throws InputError for an unknown method or bad options; NumericalError when the method fails.
 TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const IntegratorOptions&,
                          const Checkpoint<TreeTrajectory>& = {});

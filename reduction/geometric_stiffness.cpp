@@ -180,10 +180,11 @@ MatrixXd marker_stiffness(const ReducedBody& body, const std::string& marker, co
   return K;
 }
 
-double relative_stiffness(const ReducedBody& body, const MatrixXd& Kg) {
-  if (body.n() == 0 || Kg.isZero(0)) return 0;
+std::array<double, 2> relative_stiffness(const ReducedBody& body, const MatrixXd& Kg) {
+  if (body.n() == 0 || Kg.isZero(0)) return {0, 0};
   const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(Kg, body.Ke, Eigen::EigenvaluesOnly);
-  return solver.info() == Eigen::Success ? solver.eigenvalues().cwiseAbs().maxCoeff() : 0;
+  if (solver.info() != Eigen::Success) return {0, 0};
+  return {solver.eigenvalues().minCoeff(), solver.eigenvalues().maxCoeff()};
 }
 
 }  // namespace flexboom

@@ -5,6 +5,7 @@
 #include "reduction/reduced_body.hpp"
 #include "reduction/static_shapes.hpp"
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -46,7 +47,8 @@ Eigen::MatrixXd motion_stiffness(const ReducedBody&, const Eigen::Vector3d& omeg
 Eigen::MatrixXd marker_stiffness(const ReducedBody&, const std::string& marker, const Eigen::Vector3d& force,
                                  const Eigen::Vector3d& torque);
 
-/// Size of a geometric stiffness against the body's own: the largest |eigenvalue| in the metric of Ke.
-double relative_stiffness(const ReducedBody&, const Eigen::MatrixXd& Kg);
+/// A geometric stiffness against the body's own: its least and its largest eigenvalue in the metric of Ke. At -1 the
+/// body has no stiffness left.
+std::array<double, 2> relative_stiffness(const ReducedBody&, const Eigen::MatrixXd& Kg);
 
 }  // namespace flexboom
