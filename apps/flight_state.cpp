@@ -192,17 +192,17 @@ std::string first_few(const std::vector<std::string>& names) {
 /// A state of another scene is one fault, not one for each number.
 void check_names(TableReader& table, const std::vector<std::string>& names) {
   const std::set<std::string> wanted(names.begin(), names.end());
-  std::vector<std::string> missing, unknown;
+  std::vector<std::string> missing, others;
   for (const std::string& name : names)
     if (!table.has(name)) missing.push_back(name);
   for (const auto& [name, value] : table.value().entries)
-    if (!wanted.contains(name)) unknown.push_back(name);
-  if (missing.empty() && unknown.empty()) return;
+    if (!wanted.contains(name)) others.push_back(name);
+  if (missing.empty() && others.empty()) return;
   const toml_reader::Place at = table.value().place;
   std::string text =
       fmt::format("{}:{}:{}: state: is of another scene, or of other numbers of modes", at.file, at.line, at.column);
   if (!missing.empty()) text += "; not here: " + first_few(missing);
-  if (!unknown.empty()) text += "; not of this scene: " + first_few(unknown);
+  if (!others.empty()) text += "; not of this scene: " + first_few(others);
   throw InputError(text);
 }
 

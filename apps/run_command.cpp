@@ -158,10 +158,9 @@ void print_summary(const RunResult& r, const std::filesystem::path& folder) {
              r.trajectory.events.size());
   fmt::print("{} (relative)\n", balances(s));
   if (r.budget.measured)
-    fmt::print(
-        "errors of the outputs: discretisation {:.1e}, truncation {:.1e}, time {:.1e}, linearisation {:.1e}; total "
-        "{:.1e}\n",
-        r.budget.discretisation, r.budget.truncation, r.budget.time, r.budget.linearisation, r.budget.total());
+    fmt::print("errors of the outputs: discretisation {}, truncation {}, time {}, linearisation {}; total {}\n",
+               measured(r.budget.discretisation), measured(r.budget.truncation), measured(r.budget.time),
+               measured(r.budget.linearisation), measured(r.budget.total()));
   fmt::print("results: {}\n", folder.string());
 }
 
@@ -213,8 +212,11 @@ nlohmann::ordered_json checked(const std::string& name) {
     return {{"body", read_body(name).name}, {"warnings", nlohmann::ordered_json::array()}, {"ok", true}};
   const Scene scene = load_scene(name);
   validate(scene);
+  const bool certified = std::ranges::all_of(scene.bodies, [](const BodyScene& b) {
+    return !b.reduced || std::ranges::all_of(b.reduced->certificate, &BodyCheck::passed);
+  });
   return {{"scene", scene.name},           {"bodies", scene.bodies.size()}, {"hinges", scene.hinges.size()},
-          {"joints", scene.joints.size()}, {"warnings", scene.warnings},    {"ok", true}};
+          {"joints", scene.joints.size()}, {"warnings", scene.warnings},    {"ok", certified}};
 }
 
 }  // namespace
@@ -258,11 +260,13 @@ int check_command(const std::string& name, const CommonOptions& common) {
       for (const auto& w : found["warnings"]) print_note("warning: " + w.get<std::string>());
       const bool tree = found.value("joints", 0) > 0;
       if (found.contains("scene"))
-        fmt::print("{}: {} bodies, {} {}: no faults\n", found["scene"].get<std::string>(), found["bodies"].get<int>(),
-                   found[tree ? "joints" : "hinges"].get<int>(), tree ? "joints" : "hinges");
+        fmt::print("{}: {} bodies, {} {}: {}\n", found["scene"].get<std::string>(), found["bodies"].get<int>(),
+                   found[tree ? "joints" : "hinges"].get<int>(), tree ? "joints" : "hinges",
+                   found["ok"].get<bool>() ? "no faults" : "a body fails its own checks");
       else
         fmt::print("{}: no faults\n", found["body"].get<std::string>());
     }
+    if (!found["ok"].get<bool>()) return exit_check_failed;
   } catch (const InputError& e) {
     if (common.json) print_faults(e.what());
     throw;

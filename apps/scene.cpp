@@ -262,7 +262,13 @@ BodyScene read_reduced_body(TableReader& table, Reading& reading) {
 /// `in_tree`: of a scene with joints.
 BodyScene read_body_entry(TableReader table, bool in_tree, Reading& reading) {
   if (in_tree && table.has("mass")) return read_rigid_body(table, reading);
-  if (in_tree && table.is_text("file") && table.text("file").ends_with(".h5")) return read_reduced_body(table, reading);
+  if (table.is_text("file") && table.text("file").ends_with(".h5")) {
+    if (in_tree) return read_reduced_body(table, reading);
+    reading.faults.add(table.path(), table.place("file"),
+                       "file: is a reduced body; a scene of [hub] and [[hinges]] makes its booms from their geometry. "
+                       "Give the scene [[joints]]: the hub is then one of the [[bodies]], each hinge a joint");
+    return {};
+  }
   const std::string stiffening = in_tree ? table.text("stiffening", "auto") : "";
   BodyScene body;
   if (table.has("file")) {
@@ -357,6 +363,13 @@ void read_initial(TableReader table, Scene& scene) {
   table.reject_unknown();
 }
 
+void read_around_hub(TableReader& table, Scene& scene, Reading& reading) {
+  if (auto orbit = table.table("orbit")) scene.orbit = read_orbit(*orbit);
+  if (auto hub = table.table("hub", true)) scene.hub = read_hub(*hub, reading);
+  if (auto initial = table.table("initial")) read_initial(*initial, scene);
+  for (TableReader& hinge : table.tables("hinges")) scene.hinges.push_back(read_hinge(hinge));
+}
+
 Scene read_whole_scene(TableReader& table, Reading& reading) {
   Scene scene;
   read_format(table, scene_keys::scene_format);
@@ -367,15 +380,11 @@ Scene read_whole_scene(TableReader& table, Reading& reading) {
   const bool in_tree = table.has("joints");
   if (auto accuracy = table.table("accuracy")) read_accuracy(*accuracy, scene);
   if (auto integrator = table.table("integrator")) read_integrator(*integrator, scene);
-  if (auto orbit = table.table("orbit")) scene.orbit = read_orbit(*orbit);
-  if (auto hub = table.table("hub", !in_tree)) scene.hub = read_hub(*hub, reading);
-  if (auto initial = table.table("initial")) read_initial(*initial, scene);
   for (TableReader& body : table.tables("bodies")) {
     scene.bodies.push_back(read_body_entry(body, in_tree, reading));
     warn_of_rigid(scene.bodies.back(), body.path("modes"), body.has("modes"), reading.warnings);
   }
-  for (TableReader& hinge : table.tables("hinges")) scene.hinges.push_back(read_hinge(hinge));
-  if (in_tree) read_tree(table, scene);
+  in_tree ? read_tree(table, scene) : read_around_hub(table, scene, reading);
   table.reject_unknown();
   return scene;
 }
@@ -402,16 +411,34 @@ double OrbitScene::rate() const {
   return std::sqrt(mu / (radius * radius * radius));
 }
 
-Scene parse_scene(const std::string& text, const std::string& file_name, const std::filesystem::path& folder) {
+namespace {
+
+Scene parse_scene(const std::string& text, const std::string& file_name, Reading& reading) {
   const Value root = parse_format(text, file_name, scene_keys::scene_format);
-  Reading reading;
-  reading.folder = folder;
   TableReader table(root, "", reading.faults);
   Scene scene = read_whole_scene(table, reading);
   check_scene(scene, reading.faults);
   reading.faults.throw_if_any();
+  warn_of_oddities(scene, reading.warnings);
   scene.warnings = std::move(reading.warnings);
   return scene;
+}
+
+}  // namespace
+
+Scene parse_scene(const std::string& text, const std::string& file_name, const std::filesystem::path& folder) {
+  Reading reading;
+  reading.folder = folder;
+  return parse_scene(text, file_name, reading);
+}
+
+std::set<std::string> keys_known(const std::string& scene, const std::filesystem::path& folder) {
+  std::set<std::string> keys;
+  Reading reading;
+  reading.folder = folder;
+  reading.faults.note_keys(keys);
+  parse_scene(scene, "scene", reading);
+  return keys;
 }
 
 Scene read_scene(const std::filesystem::path& path) {

@@ -47,6 +47,7 @@ struct BodyScene {
   std::shared_ptr<const ReducedBody> reduced;  // instead of a geometry; structure is that of the file
   std::filesystem::path reduced_file;          // where `reduced` is from, absolute
   bool is_boom() const { return !rigid && !reduced; }
+  bool is_elastic() const;  // has it coordinates, as far as that is known before it is made?
 };
 
 /// A rigid hub. Inertia about its mass centre, which is the origin of its BRF.

@@ -1,3 +1,4 @@
+#include "apps/deflection.hpp"
 #include "apps/scene.hpp"
 #include "apps/scene_checks.hpp"
 #include "apps/scene_keys.hpp"
@@ -5,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <set>
@@ -47,17 +49,29 @@ void check_times(Faults& faults, const Scene& scene) {
 }
 
 void check_accuracy(Faults& faults, const Scene& scene) {
-  if (!(scene.tolerance > 0 && scene.tolerance <= 0.1)) {
-    faults.add("accuracy.tolerance", fmt::format("is {}; it must be above 0 and at most 0.1", scene.tolerance));
-  }
+  constexpr double least = 1e-14;  // some steps of round-off
+  if (!(scene.tolerance >= least && scene.tolerance <= 0.1))
+    faults.add("accuracy.tolerance",
+               fmt::format("is {}; it must be {:g} or more, which is what double precision leaves, and at most 0.1",
+                           scene.tolerance, least));
   std::vector<std::string> known = {"hub.rotation", "hub.rate", "hub.position"};
   for (const BodyScene& body : scene.bodies) {
-    for (const char* of_body : {".angle", ".rate", ".q", ".tip"}) known.push_back(body.name + of_body);
+    for (const char* of_body : {".angle", ".rate", ".tip"}) known.push_back(body.name + of_body);
+    if (body.is_elastic()) known.push_back(body.name + ".q");
   }
   if (scene.is_tree) known = tree_outputs(scene);
   const std::vector<std::string_view> names(known.begin(), known.end());
   if (!body_names_known(faults, scene)) return;
-  for (const std::string& output : scene.outputs) check_name_among(faults, "accuracy.outputs", output, names);
+  for (const std::string& output : scene.outputs) {
+    const auto without = std::ranges::find_if(scene.bodies, [&](const BodyScene& b) {
+      return b.reduced && b.reduced->n() > 0 && output == b.name + ".tip" && !tip_of(*b.reduced);
+    });
+    if (without == scene.bodies.end())
+      check_name_among(faults, "accuracy.outputs", output, names);
+    else
+      faults.add("accuracy.outputs",
+                 fmt::format("names {}, but {}", toml_reader::quoted(output), no_tip(*without->reduced)));
+  }
 }
 
 void check_integrator(Faults& faults, const Scene& scene) {
@@ -81,9 +95,9 @@ void check_hub(Faults& faults, const Scene& scene) {
   check_finite(faults, "initial.rate", scene.start_rate);
   check_finite(faults, "initial.velocity", scene.start_velocity);
   if (!hub.fixed) {
-    if (!(std::isfinite(hub.mass) && hub.mass > 0)) {
+    if (!(std::isfinite(hub.mass) && hub.mass > 0))
       faults.add("hub.mass", fmt::format("is {} kg; it must be positive, or hub.fixed = true", hub.mass));
-    }
+    check_positive(faults, "hub.mass", hub.mass, " kg");
     check_inertia(faults, "hub.inertia", hub.inertia, false);
     return;
   }
@@ -126,8 +140,8 @@ void check_hinge(Faults& faults, const std::string& path, const HingeScene& hing
   check_not_negative(faults, join(path, "P3"), mechanism.stop_stiffness, " N m/rad");
   check_finite(faults, join(path, "rest"), mechanism.rest);
   check_finite(faults, join(path, "threshold"), mechanism.threshold);
-  check_finite(faults, join(path, "start_angle"), hinge.start_angle);
-  check_finite(faults, join(path, "start_rate"), hinge.start_rate);
+  check_start(faults, join(path, "start_angle"), hinge.start_angle, " rad");
+  check_start(faults, join(path, "start_rate"), hinge.start_rate, " rad/s");
 }
 
 void check_body_names(Faults& faults, const Scene& scene) {
@@ -200,6 +214,32 @@ void check_scene(const Scene& scene, Faults& faults) {
   check_body_names(faults, scene);
   check_accuracy(faults, scene);
   scene.is_tree ? check_tree(scene, faults) : check_connections(faults, scene);
+}
+
+void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
+  const auto look = [&](const std::string& of, const HingeMechanism& m, double start, std::string_view unit) {
+    if (m.stop_stiffness == 0) return;
+    if (m.stiffness > 0 && m.rest > m.threshold)
+      warnings.push_back(
+          fmt::format("{}: the spring is at rest at {:g} {}, beyond the stop at {:g} {}: it presses on it", of, m.rest,
+                      unit, m.threshold, unit));
+    if (start > m.threshold)
+      warnings.push_back(
+          fmt::format("{}: starts at {:g} {}, beyond the stop at {:g} {}: the stop is pressed in by {:g} {}", of, start,
+                      unit, m.threshold, unit, start - m.threshold, unit));
+  };
+  for (const HingeScene& h : scene.hinges) look("hinge " + h.body, h.hinge.mechanism, h.start_angle, "rad");
+  for (const JointScene& j : scene.joints)
+    if (joint_type(j.kind).scalars == 1)
+      look("joint " + j.name, j.mechanism, j.start.empty() ? j.mechanism.rest : j.start[0],
+           j.kind == JointKind::slider ? "m" : "rad");
+  for (const BodyScene& b : scene.bodies)
+    if (b.reduced)
+      for (const BodyCheck& c : b.reduced->certificate)
+        if (!c.passed)
+          warnings.push_back(
+              fmt::format("body {}: its file {} fails its own check \"{}\": {:.6g}, not {:.6g}; make it anew", b.name,
+                          b.reduced_file.string(), c.name, c.value, c.reference));
 }
 
 void validate(const Scene& scene) {

@@ -16,13 +16,36 @@ std::string join(const std::string& path, std::string_view key) {
   return path.empty() ? std::string(key) : fmt::format("{}.{}", path, key);
 }
 
+namespace {
+
+// Beyond these a product of a few of them is no longer a number, or zero.
+constexpr double least_size = 1e-50, most_size = 1e50;
+
+}  // namespace
+
 void check_positive(Faults& faults, const std::string& path, double value, std::string_view unit) {
-  if (!(std::isfinite(value) && value > 0)) faults.add(path, fmt::format("is {}{}; it must be positive", value, unit));
+  if (!(std::isfinite(value) && value > 0)) {
+    faults.add(path, fmt::format("is {}{}; it must be positive", value, unit));
+  } else if (value < least_size || value > most_size) {
+    faults.add(path, fmt::format("is {}{}; what can be computed with lies between {:g} and {:g}", value, unit,
+                                 least_size, most_size));
+  }
 }
 
 void check_not_negative(Faults& faults, const std::string& path, double value, std::string_view unit) {
-  if (!(std::isfinite(value) && value >= 0))
+  if (!(std::isfinite(value) && value >= 0)) {
     faults.add(path, fmt::format("is {}{}; it must be zero or positive", value, unit));
+  } else if (value > 0 && value < least_size) {
+    faults.add(path,
+               fmt::format("is {}{}; it must be zero, or {:g} or more to be computed with", value, unit, least_size));
+  }
+}
+
+void check_start(Faults& faults, const std::string& path, double value, std::string_view unit) {
+  constexpr double far = 1e4;  // of angles, 1600 turns: the digits that are left must tell contacts apart
+  check_finite(faults, path, value);
+  if (std::abs(value) > far)
+    faults.add(path, fmt::format("is {}{}; a start lies between {:g} and {:g}", value, unit, -far, far));
 }
 
 void check_finite(Faults& faults, const std::string& path, double value) {
@@ -58,6 +81,11 @@ void check_inertia(Faults& faults, const std::string& path, const Matrix3d& iner
                           "the largest entry; up to 2 % is repaired with a warning",
                           skew, 100 * skew / scale));
   }
+  if (scale > 0 && (scale < least_size || scale > most_size))
+    return faults.add(path,
+                      fmt::format("has entries up to {:g} kg m^2; what can be computed with lies between {:g} and "
+                                  "{:g}",
+                                  scale, least_size, most_size));
   const Vector3d I = Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
   const std::string moments = fmt::format("principal moments {:g}, {:g}, {:g} kg m^2", I(0), I(1), I(2));
   if (may_vanish ? I(0) < -round_off * scale : I(0) <= 0) {

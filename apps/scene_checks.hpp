@@ -21,6 +21,9 @@ std::string join(const std::string& path, std::string_view key);
 void check_positive(toml_reader::Faults&, const std::string& path, double value, std::string_view unit);
 void check_not_negative(toml_reader::Faults&, const std::string& path, double value, std::string_view unit);
 void check_finite(toml_reader::Faults&, const std::string& path, double value);
+
+/// Of an angle, a length or their rates at the start: finite, and not so far away that nothing can be told apart.
+void check_start(toml_reader::Faults&, const std::string& path, double value, std::string_view unit);
 void check_finite(toml_reader::Faults&, const std::string& path, const Eigen::Vector3d&);
 void check_unit(toml_reader::Faults&, const std::string& path, const Eigen::Vector3d&);
 

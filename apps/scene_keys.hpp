@@ -4,6 +4,8 @@
 #include "fem/section.hpp"
 
 #include <array>
+#include <filesystem>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -80,6 +82,15 @@ void check_tree(const Scene&, toml_reader::Faults&);
 
 /// What formulation = "multipliers" cannot do.
 void check_multipliers(const Scene&, toml_reader::Faults&);
+
+/// What is not wrong but may not be meant: springs that press on stops, starts beyond them.
+void warn_of_oddities(const Scene&, std::vector<std::string>& warnings);
+
+/// Paths of every key that the readers of a scene look for, "bodies[].name".
+std::set<std::string> keys_known(const std::string& scene, const std::filesystem::path& folder);
+
+/// Markers that a place on the body may name.
+std::vector<std::string> marker_names(const BodyScene&);
 
 /// Columns of a scene with joints, a vector being one output: "arm.angle", "arm.q", "arm.tip".
 std::vector<std::string> tree_outputs(const Scene&);

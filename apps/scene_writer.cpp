@@ -45,6 +45,24 @@ std::string inline_damping(const DampingRule& damping) {
                      toml(damping.alpha), toml(damping.beta));
 }
 
+void write_solid(Writer& out, const SolidOptions& solid) {
+  out.table("[bodies.solid]");
+  out.key("element", solid.element);
+  out.key("accuracy", solid.accuracy);
+  out.key("order", solid.order);
+  out.key("slit", solid.slit, "m");
+  const SolidGrading& g = solid.grading;
+  out.table("[bodies.solid.grading]");
+  out.key("sectors", g.sectors);
+  out.key("rings", g.rings);
+  out.key("long_elements", g.long_elements);
+  out.key("end_layers", g.end_layers);
+  out.key("first_layer", g.first_layer);
+  out.key("growth", g.growth);
+  out.key("corner_levels", g.corner_levels);
+  out.key("factor", g.factor);
+}
+
 void write_body(Writer& out, const BodyScene& body) {
   const BeamGeometry& boom = body.geometry;
   out.table("[[bodies]]");
@@ -72,6 +90,7 @@ void write_body(Writer& out, const BodyScene& body) {
   out.key("order", boom.order);
   out.key("backend", body.backend);
   out.raw("damping", inline_damping(body.damping));
+  write_solid(out, body.solid);
   for (const BeamSegment& segment : boom.segments) write_segment(out, segment);
   for (const RigidAttachment& attachment : boom.attachments) write_attachment(out, attachment);
 }

@@ -83,6 +83,13 @@ Value convert(const toml::node& node, const Place& place) {
 }
 
 void check_lines(const std::string& text, const std::string& file) {
+  require(
+      !text.starts_with("\x89HDF"),
+      fmt::format("{}:1:1: is an HDF5 file, not text; a reduced body is `file` of one of the [[bodies]] of a scene with "
+                  "[[joints]], and `flexboom inspect` reads it",
+                  file));
+  const size_t zero = text.find('\0');
+  require(zero == std::string::npos, fmt::format("{}:1:1: is a binary file, not text: its byte {} is zero", file, zero + 1));
   size_t begin = 0;
   for (int line = 1; begin < text.size(); ++line) {
     const size_t end = std::min(text.find('\n', begin), text.size());
@@ -233,6 +240,16 @@ void Faults::throw_if_any() const {
     lines.push_back(where(fault.place) + (fault.path.empty() ? "" : fault.path + ": ") + fault.text);
   }
   throw InputError(fmt::format("{}", fmt::join(lines, "\n")));
+}
+
+void Faults::note_key(const std::string& path) {
+  if (!keys_) return;
+  std::string of_any;  // without the numbers of arrays
+  for (size_t i = 0; i < path.size(); ++i) {
+    of_any += path[i];
+    if (path[i] == '[') i = path.find(']', i) - 1;
+  }
+  keys_->insert(of_any);
 }
 
 TableReader::TableReader(const Value& table, std::string path, Faults& faults)
@@ -406,6 +423,7 @@ std::vector<TableReader> TableReader::tables(std::string_view key) {
 
 void TableReader::reject_unknown(const std::string& hint) {
   const std::vector<std::string_view> known(known_.begin(), known_.end());
+  for (const std::string_view key : known) faults_->note_key(path(key));
   for (const auto& [name, value] : table_->entries) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     const std::string near = nearest(name, known);

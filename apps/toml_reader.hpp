@@ -86,6 +86,10 @@ class Faults {
   /// @throws InputError with one line per fault, in the order of the file.
   void throw_if_any() const;
 
+  /// From now on, every key that a reader knows is noted there by its path, "bodies[].name".
+  void note_keys(std::set<std::string>& keys) { keys_ = &keys; }
+  void note_key(const std::string& path);
+
  private:
   struct Fault {
     Place place;
@@ -95,6 +99,7 @@ class Faults {
 
   std::map<std::string, Place> places_;
   std::vector<Fault> faults_;
+  std::set<std::string>* keys_ = nullptr;
 };
 
 /// Hands out the values of one table and takes note of the keys it was asked for. A value that is missing or of the

@@ -1,5 +1,6 @@
 #include "apps/tree_scene.hpp"
 
+#include "apps/deflection.hpp"
 #include "apps/scene.hpp"
 #include "apps/scene_keys.hpp"
 #include "fem/check.hpp"
@@ -45,6 +46,24 @@ Eigen::Matrix3d PlaceScene::axes() const {
   return A;
 }
 
+bool BodyScene::is_elastic() const {
+  if (reduced) return reduced->n() > 0;
+  return !rigid && structure != "rigid" && (modes > 0 || modes_auto);
+}
+
+std::vector<std::string> marker_names(const BodyScene& body) {
+  if (body.rigid) return {};
+  std::vector<std::string> names;
+  if (body.reduced) {
+    for (const Marker& m : body.reduced->markers) names.push_back(m.name);
+    return names;
+  }
+  names = {"root", "tip"};
+  for (const RigidAttachment& a : body.geometry.attachments)
+    if (!a.name.empty()) names.push_back(a.name);
+  return names;
+}
+
 std::vector<std::string> tree_outputs(const Scene& scene) {
   std::vector<std::string> names;
   for (const JointScene& joint : scene.joints) {
@@ -73,9 +92,9 @@ std::vector<std::string> tree_outputs(const Scene& scene) {
       names.push_back(fmt::format("{}.drive{}", joint.name, i));
   }
   for (const BodyScene& body : scene.bodies) {
-    if (body.rigid || body.structure == "rigid") continue;
+    if (!body.is_elastic()) continue;
     names.push_back(body.name + ".q");
-    names.push_back(body.name + ".tip");
+    if (!body.reduced || tip_of(*body.reduced)) names.push_back(body.name + ".tip");
   }
   for (const WheelScene& wheel : scene.wheels) names.push_back(wheel.name + ".spin");
   if (!scene.turns.empty()) names.push_back(scene.turns.front().body + ".pointing");

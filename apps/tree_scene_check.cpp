@@ -17,20 +17,6 @@ namespace {
 using namespace scene_checks;
 using toml_reader::Faults;
 
-/// Markers that a place on the body may name.
-std::vector<std::string> marker_names(const BodyScene& body) {
-  if (body.rigid) return {};
-  std::vector<std::string> names;
-  if (body.reduced) {
-    for (const Marker& m : body.reduced->markers) names.push_back(m.name);
-    return names;
-  }
-  names = {"root", "tip"};
-  for (const RigidAttachment& a : body.geometry.attachments)
-    if (!a.name.empty()) names.push_back(a.name);
-  return names;
-}
-
 /// Looks up what joints, forces and wheels refer to.
 class TreeCheck {
  public:
@@ -169,7 +155,7 @@ class TreeCheck {
 
   void start(const std::string& path, const JointScene& j, const JointType& type) {
     const auto scalars = [&](const char* key, const std::vector<double>& v) {
-      for (const double x : v) check_finite(faults_, path + "." + key, x);
+      for (const double x : v) check_start(faults_, path + "." + key, x, "");
       if (v.empty() || std::ssize(v) == type.scalars) return;
       faults_.add(path + "." + key,
                   type.scalars == 0

@@ -5,7 +5,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <limits>
+#include <string_view>
 
 namespace flexboom {
 namespace {
@@ -221,6 +224,21 @@ TurnScene read_turn(TableReader table) {
   return turn;
 }
 
+bool same_but_case(std::string_view a, std::string_view b) {
+  return std::ranges::equal(
+      a, b, {}, [](unsigned char c) { return std::tolower(c); }, [](unsigned char c) { return std::tolower(c); });
+}
+
+/// Decks write names in capitals: a marker that is not there as written is the one that differs by case alone.
+void spell_marker(const Scene& scene, PlaceScene& place) {
+  const auto body = std::ranges::find(scene.bodies, place.body, &BodyScene::name);
+  if (place.marker.empty() || body == scene.bodies.end()) return;
+  const std::vector<std::string> names = marker_names(*body);
+  if (std::ranges::find(names, place.marker) != names.end()) return;
+  const auto like = [&](const std::string& name) { return same_but_case(name, place.marker); };
+  if (std::ranges::count_if(names, like) == 1) place.marker = *std::ranges::find_if(names, like);
+}
+
 }  // namespace
 
 void read_tree(TableReader& table, Scene& scene) {
@@ -236,6 +254,9 @@ void read_tree(TableReader& table, Scene& scene) {
   for (TableReader& load : table.tables("loads")) scene.loads.push_back(read_load(load));
   for (TableReader& wheel : table.tables("wheels")) scene.wheels.push_back(read_wheel(wheel));
   for (TableReader& turn : table.tables("turns")) scene.turns.push_back(read_turn(turn));
+  for (JointScene& j : scene.joints) spell_marker(scene, j.a), spell_marker(scene, j.b);
+  for (SpringScene& s : scene.springs) spell_marker(scene, s.a), spell_marker(scene, s.b);
+  for (LoadScene& l : scene.loads) spell_marker(scene, l.at);
 }
 
 }  // namespace flexboom

@@ -345,7 +345,10 @@ TEST(SolidBoom, BadInputIsNamed) {
   EXPECT_EQ(error([](SolidOptions& o) { o.grading.first_layer = std::nan(""); }),
             "grading: first_layer is nan; it must be positive");
   EXPECT_EQ(error([](SolidOptions& o) { o.grading.sectors = -1; }), "grading: sectors is -1; it must be 0 to 100000");
-  EXPECT_EQ(error([](SolidOptions& o) { o.accuracy = 0; }), "accuracy is 0; it must lie between 0 and 1");
+  for (const char* value : {"0", "1e-20", "1"})
+    EXPECT_EQ(error([value](SolidOptions& o) { o.accuracy = std::stod(value); }),
+              std::string("accuracy is ") + value +
+                  "; it must be 1e-08 or more, the best that is known of a mesh, and less than 1");
   EXPECT_EQ(error([](SolidOptions& o) { o.slit = 0.001; }),
             "slit: only tubes can be slit; this boom has another section");
   EXPECT_EQ(error([](SolidOptions& o) { o.element = "tet10", o.grading.corner_levels = 2; }),

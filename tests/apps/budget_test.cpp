@@ -1,0 +1,314 @@
+// What the error budget says, and what it must not say; warnings of what a theory cannot hold.
+
+#include "apps/commands.hpp"
+#include "apps/results.hpp"
+#include "reduction/body_file.hpp"
+#include "tests/apps/run_testing.hpp"
+#include "tests/apps/scene_testing.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+namespace {
+
+/// A scene with joints whose boom was reduced before; `change` makes the file's body another one.
+Scene with_reduced(const std::string& text, const std::function<void(ReducedBody&)>& change = {}) {
+  Scene scene = parse_scene(text, "reduced.toml");
+  BodyScene& boom = scene.bodies.at(0);
+  ReducedBody body = prepare_body(boom).body;
+  if (change) change(body);
+  const std::filesystem::path file =
+      std::filesystem::path(testing::TempDir()) / ("boom." + std::to_string(::getpid()) + ".h5");
+  write_body_file(file, body);
+  BodyScene reduced;
+  reduced.name = boom.name;
+  reduced.structure = body.structure;
+  reduced.modes = 0;
+  reduced.stiffening = "auto";
+  reduced.reduced = std::make_shared<const ReducedBody>(read_body_file(file));
+  reduced.reduced_file = file;
+  std::filesystem::remove(file);
+  boom = reduced;
+  return scene;
+}
+
+bool any_has(const std::vector<std::string>& lines, const std::string& words) {
+  return std::ranges::any_of(lines, [&](const std::string& l) { return l.find(words) != std::string::npos; });
+}
+
+class Budget : public testing::TestWithParam<std::string> {
+ protected:
+  RunResult run(Scene scene) const {
+    scene.formulation = GetParam();
+    return run_scene(scene, {});
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Formulations, Budget, testing::Values("relative", "multipliers"),
+                         [](const auto& row) { return row.param; });
+
+TEST_P(Budget, OfABodyFromAFileIsNotKnown) {
+  Scene scene = with_reduced(swing_on_joints);
+  scene.tolerance = 1e-3;
+  scene.duration = 0.1;
+  const RunResult r = run(scene);
+  EXPECT_TRUE(r.budget.measured);
+  EXPECT_TRUE(std::isnan(r.budget.truncation));
+  EXPECT_TRUE(std::isnan(r.budget.discretisation));
+  EXPECT_FALSE(std::isnan(r.budget.time));
+  const nlohmann::ordered_json summary = summary_json(r, 0);
+  const nlohmann::ordered_json written = nlohmann::ordered_json::parse(summary.dump());
+  for (const char* part : {"truncation", "discretisation", "total"})
+    EXPECT_TRUE(written["error_budget"][part].is_null()) << part;
+  EXPECT_EQ(written["accuracy_met"], false);
+  EXPECT_TRUE(any_has(r.warnings, "truncation not measured: body boom was reduced before"));
+}
+
+// A boom of which no mode is kept bends all the same.
+TEST_P(Budget, OfABoomWithoutModesCountsThem) {
+  for (const std::string& text : {swing_on_hinge, swing_on_joints}) {
+    Scene scene = parse_scene(with(text, "modes = 1", "modes = 0"), "stiff.toml");
+    scene.tolerance = 1e-6;
+    scene.duration = 0.1;
+    EXPECT_GT(run(scene).budget.truncation, 1e-6);
+  }
+}
+
+TEST_P(Budget, OfRigidBodiesIsThatOfTime) {
+  Scene scene = load_scene("tumbling");
+  scene.duration = 1;
+  const RunResult r = run(scene);
+  EXPECT_EQ(r.budget.truncation + r.budget.discretisation + r.budget.linearisation, 0);
+  EXPECT_EQ(r.budget.total(), r.budget.time);
+}
+
+TEST_P(Budget, NotAskedForIsNotMet) {
+  Scene scene = load_scene("tumbling");
+  scene.duration = 0.1;
+  scene.error_budget = false;
+  const nlohmann::ordered_json summary = nlohmann::ordered_json::parse(summary_json(run(scene), 0).dump());
+  EXPECT_EQ(summary["accuracy_met"], false);
+  for (const auto& [part, value] : summary["error_budget"].items()) EXPECT_TRUE(value.is_null()) << part;
+}
+
+// A slender boom with a tip mass spins with its hub: what the hub's equations leave out adds up over the flight, far
+// beyond (Omega / omega_1)^2.
+TEST(BudgetOfAHub, CountsWhatGeometricStiffnessChanges) {
+  const std::string text = with(swing_on_hinge, "outward = [1, 0, 0]\nstiffness = 1\nP2 = 0.02",
+                                "outward = [1, 0, 0]\nstiffness = 50\nP2 = 0");
+  Scene scene = parse_scene(with(text, "[hub]", "[initial]\nrate = [0, 0, 3]\n[hub]"), "spins.toml");
+  scene.tolerance = 1e-6;
+  scene.duration = 2;
+  const RunResult r = run_scene(scene, {});
+  Scene stiffened = scene;
+  stiffened.error_budget = false;
+  stiffened.bodies[0].stiffening = "on";
+  const double change =
+      largest(compare_outputs(r.outputs, run_once(stiffened, {}).outputs, {"boom.angle", "boom.tip"}));
+  EXPECT_GT(change, 1e-4);
+  EXPECT_GE(r.budget.linearisation, 0.9 * change);
+  EXPECT_FALSE(r.budget.within(scene.tolerance));
+}
+
+TEST(BudgetOfATree, CountsWhatGeometricStiffnessChanges) {
+  Scene scene = parse_scene(with(swing_on_joints, "modes = 1", "modes = 1\nstiffening = \"off\""), "off.toml");
+  scene.tolerance = 1e-7;
+  const RunResult off = run_scene(scene, {});
+  scene.bodies[0].stiffening = "on";
+  const RunResult on = run_scene(scene, {});
+  EXPECT_GT(off.budget.linearisation, on.budget.linearisation);
+  EXPECT_GT(on.budget.linearisation, 0);  // of the order of the deflection squared
+  EXPECT_LT(on.budget.linearisation, 1e-3);
+}
+
+// A repeat that fails costs its part of the budget, not the run.
+TEST(BudgetOfAHub, OutlivesARepeatThatFails) {
+  Scene scene = load_scene("sport");
+  scene.duration = 0.3;
+  scene.tolerance = 1e-11;
+  scene.integrator = "adams";
+  const RunResult r = run_scene(scene, {});
+  EXPECT_TRUE(std::isnan(r.budget.time));
+  EXPECT_TRUE(std::isnan(r.budget.total()));
+  EXPECT_EQ(r.trajectory.time.back(), 0.3);
+  EXPECT_TRUE(any_has(r.warnings, "time not measured: "));
+}
+
+// --- momenta ---
+
+/// Drift of the momenta in a short flight of this scene.
+double drift(const std::string& text, const std::string& formulation = "relative") {
+  Scene scene = parse_scene(text, "drift.toml");
+  scene.formulation = formulation;
+  scene.error_budget = false;
+  scene.duration = 0.05;
+  return run_scene(scene, {}).trajectory.summary.momentum_drift;
+}
+
+TEST(MomentumDrift, IsUnknownWhereSomethingPushesOrHolds) {
+  for (const char* formulation : {"relative", "multipliers"}) {
+    EXPECT_LT(drift(swing_on_hinge, formulation), 1e-6);
+    EXPECT_LT(drift(swing_on_joints, formulation), 1e-6);
+    EXPECT_TRUE(std::isnan(drift(with(swing_on_hinge, "mass = 8.5", "mass = 8.5\nfixed = true"), formulation)));
+    for (const char* more :
+         {"drive = \"0.1*sin(t)\"\n", "[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\nforce = [1, 0, 0]\n",
+          "[[springs]]\nname = \"tether\"\na = { body = \"ground\", point = [1, 0, 0] }\nb = { body = \"hub\" }\n"
+          "stiffness = 1\n"})
+      EXPECT_TRUE(std::isnan(drift(swing_on_joints + more, formulation))) << more;
+    EXPECT_TRUE(std::isnan(
+        drift(with(swing_on_joints, "duration = 0.5", "duration = 0.5\ngravity = [0, 0, -1]"), formulation)));
+    EXPECT_TRUE(std::isnan(drift(with(swing_on_joints, "kind = \"free\"", "kind = \"spherical\""), formulation)));
+  }
+  EXPECT_TRUE(std::isnan(drift(swing_on_hinge + "[orbit]\ngravity = \"differential\"\n")));
+  EXPECT_LT(drift(swing_on_hinge + "[orbit]\naltitude = 4e5\n"), 1e-6);
+}
+
+// --- tips ---
+
+std::vector<std::string> outputs_of(const Scene& given) {
+  Scene scene = given;
+  scene.error_budget = false;
+  scene.duration = 0.02;
+  return run_scene(scene, {}).outputs.names;
+}
+
+/// The marker "tip" under another name.
+std::function<void(ReducedBody&)> called(const std::string& name) {
+  return [name](ReducedBody& body) {
+    for (Marker& m : body.markers)
+      if (m.name == "tip") m.name = name;
+    for (MarkerStiffness& m : body.Kg.markers)
+      if (m.marker == "tip") m.marker = name;
+  };
+}
+
+TEST(Tip, IsFoundWhateverItsSpelling) {
+  const Scene plain = parse_scene(swing_on_joints, "plain.toml");
+  const std::vector<std::string> names = outputs_of(plain);
+  for (const char* name : {"tip", "TIP", "Tip", "END", "panel_edge"}) {
+    EXPECT_EQ(outputs_of(with_reduced(swing_on_joints, called(name))), names) << name;
+    Scene named = with_reduced(swing_on_joints, called(name));
+    named.outputs = {"boom.tip"};
+    EXPECT_NO_THROW(validate(named)) << name;
+  }
+  Scene a = plain, b = with_reduced(swing_on_joints, called("TIP"));
+  a.error_budget = b.error_budget = false;
+  const RunResult x = run_scene(a, {}), y = run_scene(b, {});
+  EXPECT_GT(column(x, "boom.tip.y").cwiseAbs().maxCoeff(), 0);
+  EXPECT_EQ(column(y, "boom.tip.y").cwiseAbs().maxCoeff(), column(x, "boom.tip.y").cwiseAbs().maxCoeff());
+}
+
+// Two places that move and none called tip: the column is not there, and the plan says why.
+TEST(Tip, IsAbsentWhereNoMarkerIsOne) {
+  Scene scene = with_reduced(swing_on_joints, [](ReducedBody& body) {
+    called("edge")(body);
+    Marker other = *std::ranges::find(body.markers, std::string("edge"), &Marker::name);
+    other.name = "corner";
+    body.markers.push_back(other);
+  });
+  scene.error_budget = false;
+  scene.duration = 0.02;
+  const RunResult r = run_scene(scene, {});
+  EXPECT_EQ(std::ranges::count(r.outputs.names, "boom.tip.y"), 0);
+  EXPECT_EQ(std::ranges::count(r.outputs.names, "boom.q1"), 1);
+  EXPECT_TRUE(any_has(r.plan, "no output boom.tip")) << fmt::format("{}", fmt::join(r.plan, "\n"));
+  scene.outputs = {"boom.tip"};
+  try {
+    validate(scene);
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("no marker that is its tip"), std::string::npos) << e.what();
+  }
+}
+
+TEST(Tip, MarkersOfPlacesCompareWithoutCase) {
+  const Scene scene = parse_scene(with(swing_on_joints, "marker = \"root\"", "marker = \"ROOT\""), "case.toml");
+  EXPECT_EQ(scene.joints.back().b.marker, "root");
+}
+
+// --- warnings ---
+
+TEST_P(Budget, LargeDeflectionsAreNamed) {
+  for (const std::string& text : {swing_on_hinge, swing_on_joints}) {
+    const std::string soft = with(text, "E = 70e9", "E = 70e6");
+    Scene scene = parse_scene(soft, "soft.toml");
+    scene.error_budget = false;
+    scene.duration = 0.3;
+    if (scene.is_tree)
+      scene.joints.back().start_rate = {20};
+    else
+      scene.hinges[0].start_rate = 20;
+    const RunResult large = run(scene);
+    EXPECT_TRUE(any_has(large.warnings, "body boom: it bends by ")) << text;
+    EXPECT_TRUE(any_has(large.warnings, "% of its length"));
+    const RunResult small =
+        run(parse_scene(with(text, "duration = 0.5", "duration = 0.1\n[accuracy]\nbudget = false"), "x.toml"));
+    EXPECT_FALSE(any_has(small.warnings, "it bends by "));
+  }
+}
+
+TEST(Warnings, OfSpringsAndStartsBeyondTheStop) {
+  const std::string hinge = with(swing_on_hinge, "P3 = 0", "P3 = 20\nthreshold = 1.2");
+  EXPECT_TRUE(any_has(parse_scene(hinge, "x.toml").warnings, "hinge boom: starts at 1.5 rad, beyond the stop"));
+  EXPECT_TRUE(any_has(parse_scene(hinge, "x.toml").warnings, "hinge boom: the spring is at rest at 1.5708 rad"));
+  const std::string joint = swing_on_joints + "stop_stiffness = 10\nthreshold = 0.05\nrest = 0.06\n";
+  EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: starts at 0.07 rad, beyond the stop"));
+  EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: the spring is at rest at 0.06 rad"));
+  for (const std::string& text : {swing_on_hinge, swing_on_joints})
+    EXPECT_TRUE(parse_scene(text, "x.toml").warnings.empty());
+  for (const std::string& name : builtin_scene_names()) EXPECT_TRUE(load_scene(name).warnings.empty()) << name;
+}
+
+// What a file says of itself is read where it is used.
+TEST(Warnings, OfABodyWhoseFileFailsItsOwnChecks) {
+  const auto failed = [](ReducedBody& body) { body.certificate = {{"mass", 1.0, 2.0, 0.5, false}}; };
+  const auto passed = [](ReducedBody& body) { body.certificate = {{"mass", 1.0, 1.0, 0.0, true}}; };
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("check." + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  for (const bool good : {true, false}) {
+    Scene scene = with_reduced(swing_on_joints, good ? std::function<void(ReducedBody&)>(passed) : failed);
+    scene.bodies[0].reduced_file = folder / "boom.h5";
+    write_body_file(scene.bodies[0].reduced_file, *scene.bodies[0].reduced);
+    std::ofstream(folder / "scene.toml") << to_toml(scene);
+    CommonOptions quiet;
+    quiet.quiet = true;
+    EXPECT_EQ(check_command((folder / "scene.toml").string(), quiet), good ? exit_ok : exit_check_failed);
+    EXPECT_EQ(any_has(read_scene(folder / "scene.toml").warnings, "fails its own check \"mass\""), !good);
+  }
+  std::filesystem::remove_all(folder);
+}
+
+// A function of time that has no value names itself, wherever it is and whoever asks.
+TEST(FunctionOfTime, WithoutAValueIsNamed) {
+  const struct {
+    const char *more, *words;
+  } cases[] = {
+      {"drive = \"log(0.01 - t)\"\n", "joint hinge: drive is "},
+      {"[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\nforce = [0, \"sqrt(0.01 - t)\", 0]\n",
+       "load push: force[1] is "},
+      {"[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\ntorque = [0, 0, \"1/(t - 0.01) + log(0.01 - t)\"]\n",
+       "load push: torque[2] is "},
+      {"[[wheels]]\nname = \"spin\"\nbody = \"hub\"\ninertia = 1e-3\ntorque = \"log(0.01 - t)\"\n",
+       "wheel spin: torque is "},
+  };
+  for (const char* formulation : {"relative", "multipliers"})
+    for (const auto& c : cases) try {
+        drift(swing_on_joints + c.more, formulation);
+        ADD_FAILURE() << c.more;
+      } catch (const NumericalError& e) {
+        EXPECT_NE(std::string(e.what()).find(c.words), std::string::npos) << formulation << ": " << e.what();
+        EXPECT_NE(std::string(e.what()).find("at t = 0.01"), std::string::npos) << e.what();
+      }
+}
+
+}  // namespace
+}  // namespace flexboom
