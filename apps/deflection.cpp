@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double held = 1e-10;  // of shapes where the body is held
+constexpr double zero_shape = 1e-10;  // of shapes where the body is held
 
 bool says_tip(std::string_view name) {
   constexpr std::string_view tip = "tip";
@@ -42,7 +42,7 @@ const Marker* tip_of(const ReducedBody& body) {
   }
   int moving = 0;
   for (const Marker& m : body.markers)
-    if (m.S.norm() > held * most) only = &m, ++moving;
+    if (m.S.norm() > zero_shape * most) only = &m, ++moving;
   return named || moving != 1 ? named : only;
 }
 

@@ -107,7 +107,7 @@ bool never_flew(const std::filesystem::path& folder) {
   return document["status"] == "running" || document["status"] == "failed";
 }
 
-/// The scene begins with a saved state, whose numbers of modes replace a choice by the program.
+/// The scene begins with a saved state, whose numbers of modes replace those of the scene unless they are asked for.
 void go_on(Scene& scene, const RunArguments& a) {
   const std::filesystem::path& from = a.from;
   if (never_flew(from))
@@ -119,7 +119,7 @@ void go_on(Scene& scene, const RunArguments& a) {
                       saved->file().string(), saved->time(), scene.duration));
   for (BodyScene& b : scene.bodies) {
     const auto modes = saved->modes().find(b.name);
-    if (!std::exchange(b.modes_auto, false) || modes == saved->modes().end()) continue;
+    if ((!std::exchange(b.modes_auto, false) && a.modes.has_value()) || !b.is_elastic() || modes == saved->modes().end()) continue;
     b.modes = modes->second;
   }
   scene.from = std::move(saved);

@@ -184,7 +184,7 @@ std::vector<std::string> output_names(const Scene& scene, const System& system) 
 
 }  // namespace
 
-OutputTable output_table(const Scene& scene, const Flyable& f, const Trajectory& motion, Stiffening stiffening) {
+OutputTable output_table(const Scene& scene, const Flyable& f, const Trajectory& motion) {
   const System& system = f.system;
   OutputTable table{output_names(scene, system), {}};
   const auto rows = static_cast<Eigen::Index>(motion.time.size());
@@ -212,7 +212,7 @@ OutputTable output_table(const Scene& scene, const Flyable& f, const Trajectory&
       for (const double q : s.q[b]) put(q);
       const ReducedBody& body = system.appendages()[b].body;
       const Marker* tip = tip_of(body);
-      put_vector(tip ? displacement(body, *tip, s.q[b], stiffening) : Vector3d::Zero());
+      put_vector(tip ? displacement(body, *tip, s.q[b], Stiffening::off) : Vector3d::Zero());
     }
     put(motion.balance[i].kinetic);
     put(motion.balance[i].elastic);
@@ -347,8 +347,6 @@ Run fly_hub(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks
     options.stops = scene.from->stops(hinge_names(f.system));
   }
   r.prepare_seconds = start.seconds();
-  const bool stiffened = std::ranges::any_of(scene.bodies, [](const BodyScene& b) { return b.stiffening == "on"; });
-  const Stiffening stiffening = stiffened ? Stiffening::on : Stiffening::off;
   const Stopwatch watch;
   Checkpoint<Trajectory> checkpoint;
   size_t told = 0;
@@ -356,16 +354,15 @@ Run fly_hub(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks
     checkpoint = [&](const Trajectory& so_far, size_t outputs) {
       Run part = r;
       part.motion = rows_of(so_far, told, outputs);
-      part.outputs = output_table(scene, f, part.motion, stiffening);
+      part.outputs = output_table(scene, f, part.motion);
       part.end = end_of(f, r.bodies, so_far);
       part.integrate_seconds = watch.seconds();
       hooks.checkpoint(std::move(part), std::exchange(told, outputs));
     };
-  r.motion = stiffened   ? integrate_stiffened(f.system, y, options)
-             : redundant ? integrate_by_multipliers(f.system, y, options, checkpoint)
-                         : integrate(f.system, y, options, checkpoint);
+  r.motion = redundant ? integrate_by_multipliers(f.system, y, options, checkpoint)
+                       : integrate(f.system, y, options, checkpoint);
   r.integrate_seconds = watch.seconds();
-  r.outputs = output_table(scene, f, r.motion, stiffening);
+  r.outputs = output_table(scene, f, r.motion);
   r.end = end_of(f, r.bodies, r.motion);
   return r;
 }
@@ -457,7 +454,7 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
   plan.push_back(scene.formulation == "multipliers" ? "formulation: redundant coordinates, joints by multipliers"
                                                     : "formulation: relative coordinates");
   if (scene.is_tree) return describe_tree(scene, run, plan);
-  plan.emplace_back("geometric stiffness: left out, what it changes is error_budget.linearisation");
+  plan.emplace_back("geometric stiffness: left out, what that may change is error_budget.linearisation");
   if (scene.orbit)
     plan.push_back(fmt::format("orbit: rate {:.6e} rad/s{}; differential gravity {}, {:.1e} 1/s^2", scene.orbit->rate(),
                                scene.orbit->J2 ? ", with J2" : "",

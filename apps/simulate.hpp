@@ -118,9 +118,8 @@ IntegratorOptions integrator_options(const Scene&, const RunHooks&, std::string_
 /// `max_steps` > 0 bounds its cost: NumericalError above.
 Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
 
-/// Columns of trajectory.csv, of a motion that began at the flyable's start or went on from there. Tips move with their
-/// foreshortening where stiffening is on.
-OutputTable output_table(const Scene&, const Flyable&, const Trajectory&, Stiffening = Stiffening::off);
+/// Columns of trajectory.csv, of a motion that began at the flyable's start or went on from there.
+OutputTable output_table(const Scene&, const Flyable&, const Trajectory&);
 
 /// Time, numbers and modes at the end of a flight; names and stops are for the caller.
 FlightState end_of(const std::vector<PreparedBody>&, double time, const Eigen::VectorXd& y, const MotionScales& largest);

@@ -356,46 +356,19 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   return r;
 }
 
-namespace {
-
-/// The state of a hub's tree, without energies. Up to them both have the same numbers.
-VectorXd on_tree(const System& of_hub, const Tree& tree, const VectorXd& y) {
-  const Eigen::Index motion = of_hub.layout().dissipated();
-  VectorXd r = VectorXd::Zero(tree.layout().size);
-  r.head(motion) = y.head(motion);
-  return r;
-}
-
-}  // namespace
-
-Trajectory integrate_stiffened(const System& of_hub, const VectorXd& start, IntegratorOptions options) {
-  const Multibody bodies = multibody_of(of_hub);
-  std::vector<Stiffening> stiffening;
-  for (const ReducedBody& b : bodies.bodies) stiffening.push_back(has_stiffening(b) ? Stiffening::on : Stiffening::off);
-  const Tree tree(bodies, stiffening);
-  options.method = "bdf";
-  TreeTrajectory flight = integrate(tree, on_tree(of_hub, tree, start), options);
-  Trajectory r;
-  for (const VectorXd& y : flight.y) {
-    VectorXd& row = r.y.emplace_back(VectorXd::Zero(of_hub.layout().size));
-    row.head(of_hub.layout().dissipated()) = y.head(of_hub.layout().dissipated());
-    r.balance.emplace_back();
-  }
-  r.time = std::move(flight.time);
-  return r;
-}
-
 std::vector<LargestStiffening> stiffening_of_hub(const System& of_hub, const Trajectory& motion) {
   const Tree tree(multibody_of(of_hub));
   const size_t first = of_hub.fixed_hub() ? 0 : 1;  // joint that is a hinge, body that is a boom
   std::vector<LargestStiffening> largest(tree.scene().bodies.size());
   std::vector<char> contact(tree.scene().joints.size(), 0);
+  VectorXd y = VectorXd::Zero(tree.layout().size);
+  const Eigen::Index same = of_hub.layout().dissipated();  // up to here both have the same states
   const size_t stride = motion.y.size() / 500 + 1;
   for (size_t row = 0; row < motion.y.size(); row += stride) {
     for (size_t i = first; i < contact.size(); ++i)
       contact[i] = of_hub.gap(motion.y[row].data(), static_cast<int>(i - first)) > 0;
-    observe(tree.stiffening_effect(motion.time[row], on_tree(of_hub, tree, motion.y[row]), contact), motion.time[row],
-            largest);
+    y.head(same) = motion.y[row].head(same);
+    observe(tree.stiffening_effect(motion.time[row], y, contact), motion.time[row], largest);
   }
   largest.erase(largest.begin(), largest.begin() + static_cast<std::ptrdiff_t>(first));
   return largest;

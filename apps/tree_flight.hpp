@@ -69,10 +69,6 @@ void describe_tree(const Scene&, const Run&, std::vector<std::string>& plan);
 /// Boxes of rigid bodies and deformed flexible ones at a row of the run, inertial axes.
 VtkGrid tree_picture(const RunResult&, size_t row);
 
-/// The flight of a hub with geometric stiffness in the equations of its bodies, which those of a System leave out.
-/// Gravity of an orbit is left out; energies are not measured.
-Trajectory integrate_stiffened(const System& of_hub, const Eigen::VectorXd& start, IntegratorOptions);
-
 /// The geometric stiffness of its bodies in a flight of a hub without it.
 std::vector<LargestStiffening> stiffening_of_hub(const System& of_hub, const Trajectory&);
 

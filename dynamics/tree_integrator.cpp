@@ -150,7 +150,7 @@ class TreeFlight {
     if (so_far_) {
       const size_t outputs = result_.time.size();
       const IntegrationSummary summary = result_.summary;
-      const std::vector<double> effect = result_.stiffening_effect;
+      const std::vector<LargestStiffening> effect = result_.stiffening_effect;
       result_.summary.interrupted = true;
       finish();
       so_far_(result_, outputs);

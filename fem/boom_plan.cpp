@@ -14,8 +14,6 @@ namespace flexboom {
 namespace {
 
 constexpr double best_accuracy = 1e-8;  // the last rows of `choices`
-
-constexpr double round_off = 1e-12;  // relative
 constexpr int max_solid_order = 8;
 // A quarter of a circle in one element of degree p: quadratic fields (the contraction across in bending) are sines of
 // twice the angle, which polynomials follow better when nodes lie slightly nearer the middle. With p = 4 the bending

@@ -85,6 +85,7 @@ TEST_P(Budget, OfABoomWithoutModesCountsThem) {
 TEST_P(Budget, OfRigidBodiesIsThatOfTime) {
   Scene scene = load_scene("tumbling");
   scene.duration = 1;
+  scene.error_budget = true;
   const RunResult r = run(scene);
   EXPECT_EQ(r.budget.truncation + r.budget.discretisation + r.budget.linearisation, 0);
   EXPECT_EQ(r.budget.total(), r.budget.time);
@@ -99,23 +100,29 @@ TEST_P(Budget, NotAskedForIsNotMet) {
   for (const auto& [part, value] : summary["error_budget"].items()) EXPECT_TRUE(value.is_null()) << part;
 }
 
-// A slender boom with a tip mass spins with its hub: what the hub's equations leave out adds up over the flight, far
-// beyond (Omega / omega_1)^2.
+// A boom whose hub spins: what the hub's equations leave out adds up over the flight, beyond (Omega / omega_1)^2.
 TEST(BudgetOfAHub, CountsWhatGeometricStiffnessChanges) {
-  const std::string text = with(swing_on_hinge, "outward = [1, 0, 0]\nstiffness = 1\nP2 = 0.02",
-                                "outward = [1, 0, 0]\nstiffness = 50\nP2 = 0");
-  Scene scene = parse_scene(with(text, "[hub]", "[initial]\nrate = [0, 0, 3]\n[hub]"), "spins.toml");
-  scene.tolerance = 1e-6;
-  scene.duration = 2;
-  const RunResult r = run_scene(scene, {});
-  Scene stiffened = scene;
-  stiffened.error_budget = false;
-  stiffened.bodies[0].stiffening = "on";
-  const double change =
-      largest(compare_outputs(r.outputs, run_once(stiffened, {}).outputs, {"boom.angle", "boom.tip"}));
-  EXPECT_GT(change, 1e-4);
-  EXPECT_GE(r.budget.linearisation, 0.9 * change);
-  EXPECT_FALSE(r.budget.within(scene.tolerance));
+  const std::string soft =
+      with(with(swing_on_hinge, "stiffness = 1\nP2 = 0.02", "stiffness = 5\nP2 = 0"), "E = 70e9", "E = 7e9");
+  Scene hub = parse_scene(with(soft, "[hub]", "[initial]\nrate = [0, 0, 3]\n[hub]"), "hub.toml");
+  Scene tree = parse_scene(
+      with(with(with(with(with(swing_on_joints, "E = 70e9", "E = 7e9"), "modes = 1", "modes = 1\nstiffening = \"on\""),
+                     "b = { body = \"hub\" }", "b = { body = \"hub\" }\nstart_omega = [0, 0, 3]"),
+                "point = [0.05, 0, 0] }", "point = [0.05, 0, 0], x = [0, 1, 0], z = [0, 0, -1] }"),
+           "name = \"hinge\"", "name = \"boom\"\nrest = 1.5707963267948966"),
+      "tree.toml");
+  tree.joints.back().mechanism.stiffness = 5;
+  tree.joints.back().mechanism.damping = 0;
+  tree.joints.back().start = {1.5};
+  hub.tolerance = tree.tolerance = 1e-6;
+  hub.duration = tree.duration = 2;
+  hub.bodies[0].damping = tree.bodies[0].damping = {};
+  tree.error_budget = false;
+  const RunResult r = run_scene(hub, {}), truth = run_scene(tree, {});
+  const double change = largest(compare_outputs(r.outputs, truth.outputs, {"boom.angle", "boom.tip"}));
+  EXPECT_GT(change, 1e-3);
+  EXPECT_GE(r.budget.linearisation, change);
+  EXPECT_LE(r.budget.linearisation, 100 * change);
 }
 
 TEST(BudgetOfATree, CountsWhatGeometricStiffnessChanges) {
@@ -132,14 +139,20 @@ TEST(BudgetOfATree, CountsWhatGeometricStiffnessChanges) {
 // A repeat that fails costs its part of the budget, not the run.
 TEST(BudgetOfAHub, OutlivesARepeatThatFails) {
   Scene scene = load_scene("sport");
-  scene.duration = 0.3;
-  scene.tolerance = 1e-11;
+  scene.duration = 0.05;
   scene.integrator = "adams";
-  const RunResult r = run_scene(scene, {});
-  EXPECT_TRUE(std::isnan(r.budget.time));
-  EXPECT_TRUE(std::isnan(r.budget.total()));
-  EXPECT_EQ(r.trajectory.time.back(), 0.3);
-  EXPECT_TRUE(any_has(r.warnings, "time not measured: "));
+  bool failed = false;
+  for (double tolerance = 1e-11; tolerance > 5e-15 && !failed; tolerance /= 10) try {
+      scene.tolerance = tolerance;
+      const RunResult r = run_scene(scene, {});
+      failed = std::isnan(r.budget.time);
+      EXPECT_EQ(r.trajectory.time.back(), 0.05);
+      EXPECT_EQ(std::isnan(r.budget.total()), failed);
+      EXPECT_EQ(any_has(r.warnings, "time not measured: "), failed);
+    } catch (const NumericalError&) {
+      break;  // nor does the run itself get there
+    }
+  EXPECT_TRUE(failed);
 }
 
 // --- momenta ---
@@ -249,8 +262,10 @@ TEST_P(Budget, LargeDeflectionsAreNamed) {
     const RunResult large = run(scene);
     EXPECT_TRUE(any_has(large.warnings, "body boom: it bends by ")) << text;
     EXPECT_TRUE(any_has(large.warnings, "% of its length"));
-    const RunResult small =
-        run(parse_scene(with(text, "duration = 0.5", "duration = 0.1\n[accuracy]\nbudget = false"), "x.toml"));
+    Scene stiff = parse_scene(text, "stiff.toml");
+    stiff.error_budget = false;
+    stiff.duration = 0.1;
+    const RunResult small = run(stiff);
     EXPECT_FALSE(any_has(small.warnings, "it bends by "));
   }
 }
@@ -264,7 +279,8 @@ TEST(Warnings, OfSpringsAndStartsBeyondTheStop) {
   EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: the spring is at rest at 0.06 rad"));
   for (const std::string& text : {swing_on_hinge, swing_on_joints})
     EXPECT_TRUE(parse_scene(text, "x.toml").warnings.empty());
-  for (const std::string& name : builtin_scene_names()) EXPECT_TRUE(load_scene(name).warnings.empty()) << name;
+  for (const std::string& name : builtin_scene_names())
+    EXPECT_FALSE(any_has(load_scene(name).warnings, "beyond the stop")) << name;
 }
 
 // What a file says of itself is read where it is used.

@@ -1159,23 +1159,6 @@ class Report(Case):
         self.assertFalse((self.folder / "absent").exists())
 
 
-class Readme(Case):
-    """What the README tells to type, in its order, in one folder."""
-
-    def test_commands(self):
-        shutil.copytree(MESHES, self.folder / "meshes")
-        shutil.copy(MESHES / "sport.toml", self.folder / "my_scene.toml")
-        program = shutil.which(PROGRAM)
-        self.assert_exit(OK, flexboom("mesh", MESHES / "boom4.toml", "--structure", "solid", "-o", self.folder / "deck.inp"))
-        commands = re.findall(r"(?m)^flexboom ([^#\n]+)", (TESTS.parent / "README.md").read_text())
-        self.assertGreater(len(commands), 10)
-        for command in commands:
-            if command.startswith("bench "):  # minutes each; the class Bench has short ones
-                continue
-            result = subprocess.run([program, *command.split()], cwd=self.folder, capture_output=True, text=True, timeout=300)
-            self.assert_exit(OK, result)
-
-
 def load_tests(_loader, suites, _pattern):
     """Every n-th case, where the environment deals the cases to n processes as it deals those of GoogleTest."""
     count, index = (int(os.environ.get(name, default)) for name, default in

@@ -112,7 +112,7 @@ TEST_P(Continue, AfterTheMotionHasDied) {
     Scene scene = parse_scene(text, "dies.toml");
     scene.formulation = GetParam();
     scene.error_budget = false;
-    const RunResult first = fly(scene, 60), later = fly(scene, 61, &first), latest = fly(scene, 62, &later);
+    const RunResult first = fly(scene, 20), later = fly(scene, 21, &first), latest = fly(scene, 22, &later);
     const double left = column(later, "energy.kinetic").maxCoeff();
     EXPECT_LT(left, 1e-12 * column(first, "energy.kinetic").maxCoeff());
     for (const RunResult* r : {&later, &latest}) {
@@ -126,7 +126,7 @@ TEST_P(Continue, AfterTheMotionHasDied) {
 
 // A turn from rest to rest leaves nothing: no energy is in the dampers, and none in the wheels' work.
 TEST_P(Continue, AfterATurnFromRestToRest) {
-  Scene scene = parse_scene(R"(format = "flexboom-scene-1"
+  Scene scene = parse_scene(R"toml(format = "flexboom-scene-1"
 name = "turn"
 duration = 4
 output_step = 0.05
@@ -143,7 +143,7 @@ name = "wheel"
 body = "hub"
 inertia = 0.001
 torque = "0.01*sin(pi*t)*(t < 2)"
-)",
+)toml",
                             "turn.toml");
   scene.formulation = GetParam();
   scene.error_budget = false;

@@ -179,9 +179,16 @@ bool is_written_otherwise(const std::string& path) {
 
 // The readers say what they look for, so a new key that is not written turns this red.
 TEST(Scene, EveryKeyThatIsReadIsWritten) {
+  // Places and functions of time that are written in other ways.
+  const std::string others =
+      with(with(with(with(full_tree, "a = { body = \"ball\" }", "a = { body = \"arm\", marker = \"tip\" }"),
+                     "b = { body = \"ground\", point = [1, 1, 1] }", "b = { body = \"arm\", marker = \"head\" }"),
+                "at = { body = \"arm\", marker = \"tip\" }", "at = { body = \"hub\", point = [0, 0, 0.1] }"),
+           "torque = { time = [0, 1, 2], value = [0, 0.1, 0], interpolation = \"linear\" }",
+           "torque = { angle = 1, peak_rate = 1, peak_acceleration = 1 }");
   std::set<std::string> known, written;
   for (const std::string& text :
-       {std::string(full_scene), std::string(full_tree), std::string(builtin_scene("sport-calibration")),
+       {std::string(full_scene), std::string(full_tree), others, std::string(builtin_scene("sport-calibration")),
         std::string(builtin_scene("slider-crank"))}) {
     known.merge(keys_known(text, "."));
     std::set<std::string> given;
@@ -227,7 +234,7 @@ TEST(Scene, RandomNumbersSurviveTheRoundTripBitForBit) {
       hinge.hinge.stowed = Eigen::Vector3d::NullaryExpr([&] { return unit(random); }).normalized();
       hinge.hinge.outward = hinge.hinge.stowed.unitOrthogonal();
       hinge.hinge.mechanism.stiffness = unit(random) * 1e-7;
-      hinge.start_angle = unit(random) * 1e4;
+      hinge.start_angle = unit(random) * 1.5;
     }
     expect_round_trip(scene);
   }

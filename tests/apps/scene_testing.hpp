@@ -230,6 +230,7 @@ kind = "free"
 b = { body = "hub" }
 [[joints]]
 name = "hinge"
+kind = "hinge"
 a = { body = "hub", point = [0.05, 0, 0] }
 b = { body = "boom", marker = "root" }
 stiffness = 1

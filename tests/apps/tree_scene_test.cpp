@@ -29,7 +29,7 @@ std::string fault_of(const std::string& text) {
 TEST(TreeScene, IsReadAndWrittenBack) {
   const Scene scene = parse_scene(full_tree, "scene.toml");
   ASSERT_TRUE(scene.is_tree);
-  ASSERT_EQ(scene.joints.size(), 4u);
+  ASSERT_EQ(scene.joints.size(), 5u);
   EXPECT_EQ(scene.joints[0].name, "lift");
   EXPECT_EQ(scene.joints[0].kind, JointKind::slider);
   EXPECT_EQ(scene.joints[0].mechanism.threshold, 0.2);
