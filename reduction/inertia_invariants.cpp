@@ -26,7 +26,7 @@ using Eigen::VectorXd;
 
 // ---- checks by independent routes: the definitions with tilde matrices, a finer quadrature, rigid motions and M ----
 
-/// Adds one mass point to a body, each integral as FORMULATION 2 defines it.
+/// Adds one mass point to a body, each integral as section 4 of README.md defines it.
 void add_by_definition(ReducedBody& sum, double dm, const Vector3d& u0, const Matrix3Xd& S) {
   const Matrix3d U = tilde(u0);
   sum.m += dm;

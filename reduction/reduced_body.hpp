@@ -77,7 +77,7 @@ struct DisplayShape {
 };
 
 /// A reduced flexible body: modal invariants over the undeformed body, in BRF axes, about the BRF origin (Shabana 2013,
-/// ch. 5; FORMULATION 2). A rigid body has n = 0. Units: SI; a coordinate q_k has the unit that makes S_k q_k metres.
+/// ch. 5; eqs. 6, 7). A rigid body has n = 0. Units: SI; a coordinate q_k has the unit that makes S_k q_k metres.
 struct ReducedBody {
   std::string name;
   std::string structure;          // "rigid", "eq14", "beam", "solid"

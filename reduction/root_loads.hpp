@@ -9,7 +9,7 @@
 
 namespace flexboom {
 
-/// Inertia of a body with elastic coordinates q, about the BRF origin: mc(q), J(q), Cr(q) of FORMULATION 2.
+/// Inertia of a body with elastic coordinates q, about the BRF origin: mc(q), J(q), Cr(q) (Shabana 2013, ch. 5).
 struct DeformedInertia {
   Eigen::Vector3d mc;   // [kg m]
   Eigen::Matrix3d J;    // [kg m^2]
@@ -49,7 +49,7 @@ struct RootLoads {
 };
 
 /// What the carrier of a body exerts on it at its root, the BRF origin, so that it moves like this under the given
-/// marker loads: the rates of its momenta less the loads (first two rows of FORMULATION 3; the carrier feels the
+/// marker loads: the rates of its momenta less the loads (first two rows of eqs. 7-9; the carrier feels the
 /// opposite). All rigid inertia is in it, so what the modes leave out is missing from q_ddot alone. Forces on markers
 /// act where the marker has gone: at position + S q.
 /// @throws InputError when q, q_dot or q_ddot is neither empty nor of size n, or for a marker that does not exist.

@@ -42,8 +42,8 @@ VectorXd moving_state(const Flyable& f) {
   return integrate(f.system, f.y0, o).y.back();
 }
 
-/// The same accelerations the plain way: the mass matrices of section 3 of the theory, one dense projection, one dense
-/// solve.
+/// The same accelerations the plain way: the mass matrices of eq. 7 as in dynamics/README.md, one dense
+/// projection, one dense solve.
 VectorXd plain_accelerations(const System& system, const VectorXd& y, const std::vector<char>& contact) {
   const State s = system.unpack(y);
   const Layout& l = system.layout();

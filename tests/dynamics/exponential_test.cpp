@@ -272,7 +272,7 @@ TEST(Exponential, LongStepsMissNoContact) {
   }
 }
 
-// Clamped modes on a damped hinge: the fastest eigenvalue grows from 5e4 to 1e7 rad/s (FORMULATION 4.1).
+// Clamped modes on a damped hinge: the fastest eigenvalue grows from 5e4 to 1e7 rad/s (dynamics/README.md).
 TEST(Exponential, MoreModesDoNotShrinkTheStep) {
   long steps_with_2 = 0;
   for (const int modes : {2, 4, 8, 16}) {

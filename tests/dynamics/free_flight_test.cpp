@@ -34,7 +34,7 @@ Vector3d push(double t) {
   return size * Vector3d(0, 2, 1.5);
 }
 
-/// A free body (FORMULATION 3). State: R, attitude, v (body axes), omega, q, q_dot.
+/// A free body (eqs. 7-9). State: R, attitude, v (body axes), omega, q, q_dot.
 class FreeBody {
  public:
   explicit FreeBody(ReducedBody body) : body_(std::move(body)), n_(body_.n()) {}

@@ -5,7 +5,7 @@
 1. Clamped, a force steps on at the tip: MBDyn's trapezoidal rule against the same rule applied here to Me, De, Ke of the
    body: no error of time in it. Its steps turn each mode by 2 atan(omega h / 2), so this is the check of frequencies.
 2. A free hub that carries the body, spinning and vibrating, q up to a twentieth of the body's size: hub, attitude, q and tip against an
-   integration of FORMULATION 3 from the invariants of the body file; the time error of MBDyn taken off by step halving.
+   integration of eqs. 7-9 from the invariants of the body file; the time error of MBDyn taken off by step halving.
 SI units; z = (R, attitude, q); MBDyn's angular velocity is in inertial axes, omega here in BRF axes."""
 import re
 import shutil
@@ -43,7 +43,7 @@ def bent_deck(parts=6):
 
 
 class Body:
-    """Invariants of a body file (FORMULATION 2)."""
+    """Invariants of a body file (reduction/README.md, section 4)."""
 
     def __init__(self, path):
         with h5py.File(path, "r") as file:
@@ -55,7 +55,7 @@ class Body:
         self.n = len(self.Me)
 
     def rates(self, state, n):
-        """d/dt of (R, quaternion x y z w, q, V, omega, q_dot) in free flight: FORMULATION 3, eq. 8 corrected."""
+        """d/dt of (R, quaternion x y z w, q, V, omega, q_dot) in free flight: eqs. 7-9, eq. 8 corrected (dynamics/README.md)."""
         quaternion, q = state[3:7], state[7:7 + n]
         V, w, q_dot = state[7 + n:10 + n], state[10 + n:13 + n], state[13 + n:]
         A = Rotation.from_quat(quaternion).as_matrix()
