@@ -84,7 +84,7 @@ struct Scene {
   double tolerance = 1e-6;           // [accuracy] tolerance
   std::vector<std::string> outputs;  // [accuracy] outputs; empty: all
   bool error_budget = true;  // [accuracy] budget: repeat the run with a finer everything and print the differences
-  std::string integrator = "auto";       // [integrator] method; "auto": exponential
+  std::string integrator = "auto";       // [integrator] method; "auto": what suits the scene
   std::string formulation = "relative";  // [integrator] formulation
   double settle = -1;                    // [integrator] settle, IntegratorOptions::settle
   bool rescale_at_events = false;

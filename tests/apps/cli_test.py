@@ -699,8 +699,8 @@ class DiskFull(Case):
 
 # Boom axes of SPORT: hinge point and outward normal in hub axes; stowed along y, so at angle th the boom's x axis is
 # cos(th) e_y + sin(th) n, its y axis the derivative of that. Lengths as in Table 1.
-HINGES = {"efield_plus": ((0.05, -0.10, 0), (1, 0, 0), 0.295), "efield_minus": ((-0.05, -0.10, 0), (-1, 0, 0), 0.295),
-          "sip": ((0, -0.10, -0.17), (0, 0, -1), 0.302), "slp": ((0, -0.10, 0.17), (0, 0, 1), 0.146)}
+HINGES = {"efield_plus": ((0.116, -0.151, 0.029), (1, 0, 0), 0.295), "efield_minus": ((-0.111, -0.151, 0.029), (-1, 0, 0), 0.295),
+          "sip": ((0.091, -0.151, -0.053), (0, 0, -1), 0.302), "slp": ((0.069, -0.151, 0.053), (0, 0, 1), 0.146)}
 
 
 def rotate(vector, v):

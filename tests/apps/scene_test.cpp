@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <numbers>
 #include <random>
 
@@ -34,13 +35,40 @@ std::string fault_of(const std::string& text) {
 
 TEST(Scene, SportReadsAsThePaperSays) {
   const Scene scene = read_scene(meshes / "sport.toml");
-  EXPECT_EQ(scene.bodies.size(), 4u);
-  EXPECT_EQ(scene.bodies[2].name, "sip");
-  EXPECT_EQ(std::get<RoundBar>(scene.bodies[2].geometry.segments.at(0).start).diameter, 0.010);
-  EXPECT_EQ(scene.bodies[3].damping.value, 0.05);
-  EXPECT_EQ(scene.hinges[3].hinge.mechanism.stiffness, 0.31 / (pi / 2));
-  EXPECT_EQ(scene.hinges[3].hinge.mechanism.rest, pi / 2);
-  EXPECT_NEAR(scene.hinges[0].start_angle, 87 * pi / 180, 1e-15);  // the decimals of the file
+  EXPECT_EQ(scene.hub.mass, 8.5);
+  const struct {
+    const char* name;
+    double length, diameter;
+    Eigen::Vector3d point;
+    double P1;
+  } table_1[] = {{"efield_plus", 0.295, 0.005, {0.116, -0.151, 0.029}, 0.35},
+                 {"efield_minus", 0.295, 0.005, {-0.111, -0.151, 0.029}, 0.35},
+                 {"sip", 0.302, 0.010, {0.091, -0.151, -0.053}, 0.25},
+                 {"slp", 0.146, 0.005, {0.069, -0.151, 0.053}, 0.31}};
+  ASSERT_EQ(scene.bodies.size(), 4u);
+  ASSERT_EQ(scene.hinges.size(), 4u);
+  for (size_t i = 0; i < 4; ++i) {
+    const auto& [name, length, diameter, point, P1] = table_1[i];
+    const BodyScene& body = scene.bodies[i];
+    EXPECT_EQ(body.name, name);
+    EXPECT_EQ(body.modes, 2);
+    EXPECT_EQ(body.damping.value, 0.05);
+    const BeamSegment& bar = body.geometry.segments.at(0);
+    EXPECT_EQ(bar.length, length);
+    EXPECT_EQ(std::get<RoundBar>(bar.start).diameter, diameter);
+    EXPECT_EQ(bar.material.E, 67e9);
+    EXPECT_EQ(bar.material.nu, 0.33);
+    EXPECT_EQ(bar.material.rho, 2840);
+    const Hinge& hinge = scene.hinges[i].hinge;
+    EXPECT_EQ(scene.hinges[i].body, name);
+    EXPECT_EQ(hinge.point, point);
+    EXPECT_EQ(hinge.mechanism.stiffness, P1 / (pi / 2));  // eq. 17: P1 / Theta_r per radian, free at pi/2
+    EXPECT_EQ(hinge.mechanism.rest, pi / 2);
+    EXPECT_EQ(hinge.mechanism.damping, 0.01);
+    EXPECT_EQ(hinge.mechanism.stop_stiffness, 10);
+    EXPECT_EQ(hinge.mechanism.threshold, pi / 2);
+    EXPECT_NEAR(scene.hinges[i].start_angle, 87 * pi / 180, 1e-15);  // the decimals of the file
+  }
   ASSERT_TRUE(scene.orbit.has_value());
   // 405 km: 92.6 minutes per turn, the digits of the textbook formula with mu and the radius to 7 digits.
   EXPECT_NEAR(2 * pi / scene.orbit->rate() / 60, 92.66, 0.02);
@@ -48,10 +76,39 @@ TEST(Scene, SportReadsAsThePaperSays) {
 
 TEST(Scene, InertiaThatIsNearlySymmetricIsRepairedWithAWarning) {
   const Scene scene = read_scene(meshes / "sport.toml");
-  EXPECT_EQ(scene.hub.inertia(0, 1), 0.5 * (0.00098 + 0.0009895));
-  EXPECT_EQ(scene.hub.inertia, scene.hub.inertia.transpose());
+  const double Ixz = 0.5 * (0.00098 + 0.0009895);  // eq. 20 prints both
+  const Eigen::Matrix3d symmetric{{0.10477, 0.003148, Ixz}, {0.003148, 0.05858, -0.001259}, {Ixz, -0.001259, 0.134942}};
+  EXPECT_EQ(scene.hub.inertia, symmetric);
   ASSERT_EQ(scene.warnings.size(), 1u);
   EXPECT_NE(scene.warnings[0].find("hub.inertia: not symmetric"), std::string::npos) << scene.warnings[0];
+}
+
+/// The scene with wheels flies the spacecraft of the other, stowed directions and hinge axes included.
+TEST(Scene, CalibrationTurnsTheSpacecraftOfSport) {
+  const Scene sport = load_scene("sport"), turned = load_scene("sport-calibration");
+  ASSERT_TRUE(turned.bodies[0].rigid);
+  EXPECT_EQ(turned.bodies[0].rigid->mass, sport.hub.mass);
+  EXPECT_TRUE(turned.bodies[0].rigid->inertia.isApprox(sport.hub.inertia, 1e-15));
+  EXPECT_EQ(turned.bodies[0].rigid->size, sport.hub.size);
+  for (size_t i = 0; i < 4; ++i) {
+    const Hinge& hinge = sport.hinges[i].hinge;
+    const JointScene& joint = turned.joints[i + 1];
+    EXPECT_EQ(joint.name, sport.hinges[i].body);
+    EXPECT_EQ(joint.a.point, hinge.point);
+    EXPECT_EQ(joint.a.x, hinge.stowed);
+    EXPECT_EQ(joint.a.z, hinge.stowed.cross(hinge.outward));
+    EXPECT_EQ(joint.mechanism.stiffness, hinge.mechanism.stiffness);
+    EXPECT_EQ(joint.mechanism.rest, hinge.mechanism.rest);
+    EXPECT_EQ(joint.mechanism.damping, hinge.mechanism.damping);
+    EXPECT_EQ(joint.mechanism.stop_stiffness, hinge.mechanism.stop_stiffness);
+    EXPECT_EQ(joint.mechanism.threshold, hinge.mechanism.threshold);
+    const BeamSegment &bar = turned.bodies[i + 1].geometry.segments.at(0),
+                      &same = sport.bodies[i].geometry.segments.at(0);
+    EXPECT_EQ(bar.length, same.length);
+    EXPECT_EQ(std::get<RoundBar>(bar.start).diameter, std::get<RoundBar>(same.start).diameter);
+    EXPECT_EQ(bar.material.rho, same.material.rho);
+    EXPECT_EQ(turned.bodies[i + 1].damping.value, sport.bodies[i].damping.value);
+  }
 }
 
 TEST(Scene, BuiltInSceneIsTheFileInMeshes) {
@@ -155,6 +212,68 @@ TEST(Scene, ValidateFindsWhatAnOverrideBreaks) {
             "integrator.method: is \"bdf\"; it must be \"auto\" or \"ida\"");
   EXPECT_NE(broken([](Scene& s) { s.formulation = "redundant"; }).find("\"relative\" or \"multipliers\""),
             std::string::npos);
+}
+
+std::vector<std::string> split(std::string text, const std::string& separator) {
+  std::vector<std::string> parts;
+  for (size_t end; (end = text.find(separator)) != std::string::npos; text.erase(0, end + separator.size()))
+    parts.push_back(text.substr(0, end));
+  parts.push_back(text);
+  return parts;
+}
+
+std::string without(const std::string& characters, std::string text) {
+  std::erase_if(text, [&](char c) { return characters.find(c) != std::string::npos; });
+  return text;
+}
+
+/// What a file may leave out is in meshes/README.md with the value that it then has.
+TEST(Scene, ReadmeNamesTheDefaultsOfTheProgram) {
+  const std::string least = R"(format = "flexboom-scene-1"
+name = "least"
+orbit = {}
+hub = { mass = 8.5, inertia = [0.1, 0.12, 0.05] }
+[[bodies]]
+name = "boom"
+segments = [{ shape = "round-bar", diameter = 0.01, length = 0.3, material = { E = 7e10, nu = 0.3, rho = 2700 } }]
+[[hinges]]
+body = "boom"
+point = [0, 0, 0]
+stowed = [0, 1, 0]
+outward = [1, 0, 0]
+stiffness = 0.2
+)";
+  std::map<std::string, std::string> of_program;
+  for (const std::string& line : split(to_toml(parse_scene(least, "scene.toml")), "\n"))
+    if (const auto sides = split(split(line, "  #")[0], " = "); sides.size() == 2)
+      of_program.try_emplace(sides[0], sides[1]);
+  const std::string readme = text_of(meshes / "README.md");
+  int compared = 0;
+  for (const std::string section : {"### Scene, ", "### Body, "})
+    for (const std::string& row : split(split(split(readme, section).at(1), "\n### ")[0], "\n")) {
+      if (row.starts_with("`[solid]`")) break;
+      const std::vector<std::string> cells = split(row, " | ");
+      if (cells.size() != 3) continue;
+      std::vector<std::string> keys = split(without("|,", cells[0]), " ");
+      const std::vector<std::string> defaults = split(without("`| ", cells[2]), ",");
+      std::erase_if(keys, [](const std::string& key) { return !key.starts_with("`") || key.starts_with("`["); });
+      for (size_t i = 0; i < keys.size() && keys.size() == defaults.size(); ++i) {
+        const auto found = of_program.find(without("`", keys[i]));
+        const std::string& stated = defaults[i];
+        if (found == of_program.end() || stated.empty()) continue;
+        char* end = nullptr;
+        const double number = std::strtod(stated.c_str(), &end);
+        const bool is_number = *end == '\0';
+        if (!is_number && stated[0] != '"' && stated != "true" && stated != "false" && stated != "[]") continue;
+        if (is_number) {
+          EXPECT_EQ(std::stod(found->second), number) << row;
+        } else {
+          EXPECT_EQ(found->second, stated) << row;
+        }
+        ++compared;
+      }
+    }
+  EXPECT_GE(compared, 25);
 }
 
 TEST(Scene, EveryFaultIsReportedInOneGo) {

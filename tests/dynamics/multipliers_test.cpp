@@ -7,6 +7,7 @@
 #include "dynamics_testing.hpp"
 #include "fem/check.hpp"
 #include "multipliers_testing.hpp"
+#include "sport_testing.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
@@ -206,32 +207,19 @@ TEST(Multipliers, FlexibleBoomOnAFixedHubMeetsTheReference) {
 
 /// SPORT in both formulations.
 struct Sport {
-  ReducedBody hub;
+  ReducedBody hub = testing::sport_hub();
   std::vector<Appendage> appendages;
   Multibody scene;
 
-  explicit Sport(int modes) {
-    const Matrix3d J{{0.134942, 0.00098475, 0}, {0.00098475, 0.10477, 0}, {0, 0, 0.05858}};
-    hub = rigid_body("hub", 8.5, Vector3d::Zero(), J);
+  explicit Sport(int modes) : appendages(testing::sport_booms(modes)) {
     scene.bodies = {hub};
-    add("efield_plus", modes, 0.295, 0.005, {0.05, -0.1, 0}, {1, 0, 0}, 0.35);
-    add("efield_minus", modes, 0.295, 0.005, {-0.05, -0.1, 0}, {-1, 0, 0}, 0.35);
-    add("sip", modes, 0.302, 0.010, {0, -0.1, -0.17}, {0, 0, -1}, 0.25);
-    add("slp", modes, 0.146, 0.005, {0, -0.1, 0.17}, {0, 0, 1}, 0.31);
-  }
-
-  void add(const char* name, int modes, double length, double diameter, const Vector3d& point, const Vector3d& outward,
-           double P1) {
-    ReducedBody body = eq14::reduced_body(testing::round_boom(length, diameter), modes, eq14::Planes::xy, name);
-    apply_damping(body, {"modal", 0.05});
-    Hinge hinge;
-    hinge.name = name, hinge.point = point, hinge.outward = outward, hinge.mechanism = testing::sport_mechanism(P1);
-    Matrix3d axes;
-    axes << hinge.stowed, outward, hinge.stowed.cross(outward);
-    scene.joints.push_back(
-        joint(name, JointKind::hinge, at(0, point, axes), at(static_cast<int>(scene.bodies.size())), hinge.mechanism));
-    scene.bodies.push_back(body);
-    appendages.push_back({body, hinge});
+    for (const auto& [body, hinge] : appendages) {
+      Matrix3d axes;
+      axes << hinge.stowed, hinge.outward, hinge.stowed.cross(hinge.outward);
+      scene.joints.push_back(joint(hinge.name, JointKind::hinge, at(0, hinge.point, axes),
+                                   at(static_cast<int>(scene.bodies.size())), hinge.mechanism));
+      scene.bodies.push_back(body);
+    }
   }
 
   std::vector<BodyState> start() const {

@@ -49,7 +49,7 @@ TEST(Calibration, RigidSportPointsAsCommanded) {
 }
 
 /// In a smooth turn SIP leans on its spring, or on its stop, by what its inertia asks: with s along the boom and the
-/// hinge at (y, z) from the mass centre, k gap = int s (s + |z|) dm alpha + int s |y| dm omega^2.
+/// hinge at (y, z) from the mass centre, k gap + c gap' = int s (s + |z|) dm alpha + int s |y| dm omega^2.
 TEST(Calibration, LeansTheBoomsOnTheirSprings) {
   const Scene scene = quarter_turn("smooth", false);
   const RunResult r = run_scene(scene, {});
@@ -68,19 +68,19 @@ TEST(Calibration, LeansTheBoomsOnTheirSprings) {
   ASSERT_EQ(hinge.name, "sip");
   const double y = std::abs(hinge.a.point.y() - centre.y()), z = std::abs(hinge.a.point.z() - centre.z());
   const TimeFunction turn = rest_to_rest(turns_of(scene.turns)[0].manoeuvre).function;
-  const VectorXd t = column(r, "t"), angle = column(r, "sip.angle");
+  const VectorXd t = column(r, "t"), angle = column(r, "sip.angle"), angle_rate = column(r, "sip.rate");
   double largest = 0, worst = 0;
   for (Index i = 0; i < t.size(); ++i) {
     const double rate = turn.rate(t[i]),
                  push = (sip.J0(2, 2) + z * sip.mc0.x()) * turn.acceleration(t[i]) + y * sip.mc0.x() * rate * rate;
     const double gap = angle[i] - hinge.mechanism.rest;
-    const double k = hinge.mechanism.stiffness + (push > 0 ? hinge.mechanism.stop_stiffness : 0);
+    const double k = hinge.mechanism.stiffness + (gap > 0 ? hinge.mechanism.stop_stiffness : 0);
     largest = std::max(largest, std::abs(gap));
-    worst = std::max(worst, std::abs(gap - push / k));
+    worst = std::max(worst, std::abs(gap - (push - hinge.mechanism.damping * angle_rate[i]) / k));
   }
   std::printf("calibration: SIP leans by %.3e rad, quasi-static within %.1e\n", largest, worst);
   EXPECT_GT(largest, 1e-4);
-  EXPECT_LT(worst, 0.03 * largest);  // it lags by damping / stiffness = 0.06 s
+  EXPECT_LT(worst, 0.03 * largest);  // the boom and the hub vibrate
 }
 
 TEST(Calibration, ShakesMoreByCornersThanSmoothly) {
@@ -88,7 +88,7 @@ TEST(Calibration, ShakesMoreByCornersThanSmoothly) {
                   smooth = run_scene(quarter_turn("smooth", false), {});
   std::printf("calibration: pointing error %.2e rad by a trapezoid, %.2e smoothly\n", worst_pointing(corners),
               worst_pointing(smooth));
-  EXPECT_GT(worst_pointing(corners), 3 * worst_pointing(smooth));
+  EXPECT_GT(worst_pointing(corners), 2.5 * worst_pointing(smooth));
   EXPECT_LT(corners.trajectory.summary.momentum_drift, 1e-6);
 }
 

@@ -37,17 +37,18 @@ from scipy.special import roots_jacobi
 
 SCENE = json.loads("""
 {
-  "hub": {"mass": 8.5, "Ixx": 0.134942, "Iyy": 0.10477, "Izz": 0.05858, "Ixy": 0.00098475},
+  "hub": {"mass": 8.5, "inertia": [[0.10477, 0.003148, 0.00098475], [0.003148, 0.05858, -0.001259],
+                                   [0.00098475, -0.001259, 0.134942]]},
   "E": 67e9, "rho": 2840, "zeta": 0.05, "P2": 0.01, "P3": 10, "start_degrees": -3,
   "booms": [
     {"name": "efield_plus", "L": 0.295, "d": 0.005, "P1": 0.35,
-     "point": [ 0.05, -0.10,  0.00], "stowed": [0, 1, 0], "normal": [ 1, 0,  0]},
+     "point": [ 0.116, -0.151,  0.029], "stowed": [0, 1, 0], "normal": [ 1, 0,  0]},
     {"name": "efield_minus", "L": 0.295, "d": 0.005, "P1": 0.35,
-     "point": [-0.05, -0.10,  0.00], "stowed": [0, 1, 0], "normal": [-1, 0,  0]},
+     "point": [-0.111, -0.151,  0.029], "stowed": [0, 1, 0], "normal": [-1, 0,  0]},
     {"name": "sip", "L": 0.302, "d": 0.010, "P1": 0.25,
-     "point": [ 0.00, -0.10, -0.17], "stowed": [0, 1, 0], "normal": [ 0, 0, -1]},
+     "point": [ 0.091, -0.151, -0.053], "stowed": [0, 1, 0], "normal": [ 0, 0, -1]},
     {"name": "slp", "L": 0.146, "d": 0.005, "P1": 0.31,
-     "point": [ 0.00, -0.10,  0.17], "stowed": [0, 1, 0], "normal": [ 0, 0,  1]}
+     "point": [ 0.069, -0.151,  0.053], "stowed": [0, 1, 0], "normal": [ 0, 0,  1]}
   ]
 }
 """)
@@ -88,8 +89,7 @@ class Model:
         self.B, self.n, self.fixed_hub, self.P2, self.P3 = len(booms), modes, fixed_hub, scene["P2"], scene["P3"]
         self.k_hinge = np.array([b["P1"] / (np.pi / 2) for b in booms])
         self.hub_mass = hub["mass"]
-        self.hub_J = np.diag([hub["Ixx"], hub["Iyy"], hub["Izz"]]).astype(float)
-        self.hub_J[0, 1] = self.hub_J[1, 0] = hub["Ixy"]
+        self.hub_J = np.array(hub["inertia"])
         vectors = (np.array([b[key] for b in booms], float) for key in ("point", "stowed", "normal"))
         self.d, self.s, self.n_out = vectors
         L, dia = np.array([b["L"] for b in booms]), np.array([b["d"] for b in booms])

