@@ -51,8 +51,9 @@ class MultipliersFlight final : public DaeProblem {
     begin_contacts();
     equations_.make_consistent(t_, y_, y_dot_, memory_);
     const Balance b = balance_of(equations_, y_, memory_);
-    scales_ = std::make_unique<StateScales>(equations_, y_, y_dot_, std::abs(b.kinetic) + std::abs(b.elastic),
-                                            local_share * options.tolerance, options.duration);
+    scales_ = std::make_unique<StateScales>(
+        equations_, y_, y_dot_, std::max(std::abs(b.kinetic) + std::abs(b.elastic), options_.largest.energy),
+        local_share * options.tolerance, options.duration);
     record_pattern();
     ida_ = std::make_unique<Ida>(*this, options.linear_solver);
   }

@@ -130,7 +130,7 @@ TEST(BlockBackend, MoreModesThanTheMassMatrixHasRankIsAnInputError) {
       for (int j = i; j < std::min(n, (i / (n / 5) + 1) * (n / 5)); ++j) M.emplace_back(j, i, 1.0 / n);
     }
     s.M.setFromTriplets(M.begin(), M.end());
-    EXPECT_NE(message([&] { solve_modes(s.problem(), options(6, "block")); }).find("only 5 finite"), std::string::npos);
+    EXPECT_NE(message([&] { solve_modes(s.problem(), options(6, "block")); }).find("only 5 "), std::string::npos);
     const EigenPairs pairs = solve_modes(s.problem(), options(4, "block"));
     EXPECT_EQ(pairs.summary.sturm_count, 4);
     EXPECT_EQ(solve_modes(s.problem(), options(5, "block")).summary.sturm_count, 5);
