@@ -191,11 +191,12 @@ void ResultsFolder::write(const RunResult& r) {
     write_rows(out, r.outputs, 0);
   });
   write_file(path_ / "events.csv", events_header + events_before_ + event_rows(r, 0));
-  write_file(path_ / "state.toml", to_toml(r.end, r.scene.name));
   frames_ = frames_before_;
   if (r.scene.vtu_step > 0) write_motion(r, path_, frames_);
   summary_ = summary_json(r, watch.seconds());
   write_summary();
+  // Last: until everything is there, the state before says from where a run that is killed now can go on.
+  write_file(path_ / "state.toml", to_toml(r.end, r.scene.name));
 }
 
 void ResultsFolder::write_summary() { write_file(path_ / "summary.json", summary_.dump(2) + "\n"); }
