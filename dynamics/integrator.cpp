@@ -231,7 +231,7 @@ class Flight {
       stepper_->foresee(options_.duration, [this](const VectorXd& y) { scales_.foresee(y); });
       while (t_ < options_.duration && !stopped()) {
         advance();
-        if (clock_.due()) checkpoint();
+        if (clock_.due() && t_ < options_.duration) checkpoint();
       }
     } catch (const NumericalError&) {
       checkpoint();

@@ -65,7 +65,7 @@ class MultipliersFlight final : public DaeProblem {
       ida_->restart(t_, y_, y_dot_);
       while (t_ < options_.duration && !stopped()) {
         advance();
-        if (clock_.due()) checkpoint();
+        if (clock_.due() && t_ < options_.duration) checkpoint();
       }
     } catch (const NumericalError&) {
       checkpoint();

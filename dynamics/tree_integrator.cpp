@@ -115,7 +115,7 @@ class TreeFlight {
       stepper_->restart(t_, y_, closed_, armed_);
       while (t_ < options_.duration && !stopped()) {
         advance();
-        if (clock_.due()) checkpoint();
+        if (clock_.due() && t_ < options_.duration) checkpoint();
       }
     } catch (const NumericalError&) {
       checkpoint();
