@@ -2,8 +2,8 @@
 
 #include "apps/version.hpp"
 #include "fem/check.hpp"
-#include "fem/mesh_sets.hpp"
 #include "fem/inertia.hpp"
+#include "fem/mesh_sets.hpp"
 #include "fem/stopwatch.hpp"
 #include "fem/text_reader.hpp"
 #include "reduction/attachment_modes.hpp"

@@ -119,7 +119,9 @@ void go_on(Scene& scene, const RunArguments& a) {
                       saved->file().string(), saved->time(), scene.duration));
   for (BodyScene& b : scene.bodies) {
     const auto modes = saved->modes().find(b.name);
-    if ((!std::exchange(b.modes_auto, false) && a.modes.has_value()) || !b.is_elastic() || modes == saved->modes().end()) continue;
+    if ((!std::exchange(b.modes_auto, false) && a.modes.has_value()) || !b.is_elastic() ||
+        modes == saved->modes().end())
+      continue;
     b.modes = modes->second;
   }
   scene.from = std::move(saved);
@@ -228,9 +230,8 @@ int run_command(const RunArguments& a, const CommonOptions& common) {
   const InterruptGuard guard;
   const RunResult result = run_into(results, scene, a, common);
   const IntegrationSummary& s = result.trajectory.summary;
-  const std::string wrong = is_balanced(s)
-                                ? ""
-                                : fmt::format("{}: the motion in {} is wrong", balances(s), folder.string());
+  const std::string wrong =
+      is_balanced(s) ? "" : fmt::format("{}: the motion in {} is wrong", balances(s), folder.string());
   if (!wrong.empty()) results.fail(wrong);
   if (common.json) {
     fmt::print("{}\n", results.summary().dump(2));

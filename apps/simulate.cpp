@@ -305,7 +305,8 @@ IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, 
   return o;
 }
 
-FlightState end_of(const std::vector<PreparedBody>& bodies, double time, const VectorXd& y, const MotionScales& largest) {
+FlightState end_of(const std::vector<PreparedBody>& bodies, double time, const VectorXd& y,
+                   const MotionScales& largest) {
   FlightState end;
   end.time = time;
   end.y = y;

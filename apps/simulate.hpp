@@ -122,7 +122,8 @@ Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
 OutputTable output_table(const Scene&, const Flyable&, const Trajectory&);
 
 /// Time, numbers and modes at the end of a flight; names and stops are for the caller.
-FlightState end_of(const std::vector<PreparedBody>&, double time, const Eigen::VectorXd& y, const MotionScales& largest);
+FlightState end_of(const std::vector<PreparedBody>&, double time, const Eigen::VectorXd& y,
+                   const MotionScales& largest);
 
 /// Of a flight on its way: its events and summary, and the rows from `first` on that come before `last`.
 template <class Flight>

@@ -83,13 +83,14 @@ Value convert(const toml::node& node, const Place& place) {
 }
 
 void check_lines(const std::string& text, const std::string& file) {
-  require(
-      !text.starts_with("\x89HDF"),
-      fmt::format("{}:1:1: is an HDF5 file, not text; a reduced body is `file` of one of the [[bodies]] of a scene with "
-                  "[[joints]], and `flexboom inspect` reads it",
-                  file));
+  require(!text.starts_with("\x89HDF"),
+          fmt::format(
+              "{}:1:1: is an HDF5 file, not text; a reduced body is `file` of one of the [[bodies]] of a scene with "
+              "[[joints]], and `flexboom inspect` reads it",
+              file));
   const size_t zero = text.find('\0');
-  require(zero == std::string::npos, fmt::format("{}:1:1: is a binary file, not text: its byte {} is zero", file, zero + 1));
+  require(zero == std::string::npos,
+          fmt::format("{}:1:1: is a binary file, not text: its byte {} is zero", file, zero + 1));
   size_t begin = 0;
   for (int line = 1; begin < text.size(); ++line) {
     const size_t end = std::min(text.find('\n', begin), text.size());

@@ -32,10 +32,12 @@ PreparedBody prepare_reduced(const BodyScene&);
 std::vector<Stiffening> first_stiffening(const Scene&, const Multibody&);
 
 /// Turns on what a flight showed to count: `effect` per body. Was there any?
-bool revise_stiffening(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect, std::vector<Stiffening>&);
+bool revise_stiffening(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect,
+                       std::vector<Stiffening>&);
 
 /// Would that turn on any? Then the flight that showed it is not worth keeping.
-bool will_be_revised(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect, std::vector<Stiffening>);
+bool will_be_revised(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect,
+                     std::vector<Stiffening>);
 
 /// Flies until no flight shows more that counts; one that fails without it is flown again with it. `fly` sets `effect`
 /// and says whether it was interrupted. @throws NumericalError as `fly`.
