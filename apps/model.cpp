@@ -46,17 +46,14 @@ Model file_model(const std::filesystem::path& path, const ModelOptions& options)
                                     {options.accuracy.has_value(), "--accuracy"}}) {
     require(!given, fmt::format("{}: is for body files (.toml); {} has its elements", name, path.string()));
   }
-  MeshFile file = read_mesh(path, options.read);
+  ReadOptions read = options.read;
+  if (options.material) read.material = parse_material(*options.material);
+  MeshFile file = read_mesh(path, read);
   Model model;
   model.name = path.stem().string();
   model.mesh = std::move(file.mesh);
   model.modes = file.modes;
   model.notes = std::move(file.notes);
-  if (options.material) {
-    const Material material = parse_material(*options.material);
-    for (SolidProperty& p : model.mesh.solid_properties) p.material = material;
-    for (BeamProperty& p : model.mesh.beam_properties) p.material = material;
-  }
   if (options.clamp) model.clamp.nodes = node_set(model.mesh, *options.clamp);
   model.clamp.with_supports = !options.free;
   return model;

@@ -15,6 +15,17 @@ constexpr double same_time = 1e-12;  // relative: times this close are one
 
 }  // namespace
 
+void ChatterGuard::contact(double t, const std::string& name) {
+  constexpr int most = 1000;
+  in_a_row_ = std::abs(t - last_) <= same_time * std::abs(t) ? in_a_row_ + 1 : 0;
+  last_ = t;
+  if (in_a_row_ < most) return;
+  throw NumericalError(
+      fmt::format("\"{}\" chatters: {} contacts at t = {:.9g} s without time passing; is its stop, or "
+                  "what presses against it, of a size that can be computed with?",
+                  name, in_a_row_, t));
+}
+
 void check_options(const FlightOptions& o, std::size_t stops) {
   require(o.tolerance > 0 && o.tolerance <= 0.1, fmt::format("tolerance {:g} must lie in (0, 0.1]", o.tolerance));
   require(o.duration > 0 && std::isfinite(o.duration), fmt::format("duration {:g} s must be positive", o.duration));

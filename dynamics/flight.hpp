@@ -9,6 +9,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace flexboom {
@@ -86,6 +87,17 @@ class Approach {
 
  private:
   double largest_ = 0;  // [rad/s] or [m/s]
+};
+
+/// Contacts that follow each other without time passing: a flight that no longer goes on.
+class ChatterGuard {
+ public:
+  /// @throws NumericalError naming the hinge or joint after a thousand contacts within round-off of each other.
+  void contact(double t, const std::string& name);
+
+ private:
+  double last_ = -1;  // [s]
+  int in_a_row_ = 0;
 };
 
 /// @throws InputError naming the option that makes no sense; `stops`: how many histories there may be.

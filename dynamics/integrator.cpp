@@ -334,6 +334,7 @@ class Flight {
         if (!slipped) gap = 0;  // on the stop, exactly: the root is good to round-off of t
         contacts_.closed[i] = contact;
         result_.events.push_back({t_, hinge, contact, rate});
+        chatter_.contact(t_, system_.appendages()[i].body.name);
         changed = true;
         approach_[i].restart(rate);
         if (std::abs(rate) < settle_ * largest && !pushed(i, settle_ * largest)) settle(i);
@@ -351,7 +352,7 @@ class Flight {
     if (!approach_[i].has_decayed(rate)) return false;
     const ErrorScale& error = scales_.error();
     const Layout& l = system_.layout();
-    const double noise = error.tolerance * error.scale[l.p + l.base + l.body[i]];
+    const double noise = 10 * error.tolerance * error.scale[l.p + l.base + l.body[i]];  // errors of steps add up
     asleep_[i] = std::max({settle_ * contacts_.history[i].largest_rate, approach_[i].round_off(), noise});
     if (!(std::abs(rate) < asleep_[i])) return false;
     // Stiff modes make a push of what the method's error leaves open of them.
@@ -449,6 +450,7 @@ class Flight {
   WorkspaceHandle work_;
   std::vector<int> crossed_;
   std::vector<Approach> approach_;
+  ChatterGuard chatter_;
   std::vector<double> asleep_;  // rates below this do not wake a hinge that has settled on its way [rad/s]
   long steps_ = 0;
   Trajectory result_;

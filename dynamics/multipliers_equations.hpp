@@ -25,7 +25,7 @@ struct Prepared {
 };
 
 /// Sums what is added, always in the same order, into the values of a matrix with a fixed pattern.
-class Assembly {
+class PatternSum {
  public:
   /// While recording, collects the pattern; `finish` sorts it by columns.
   void add(int row, int column, double value) {
@@ -96,7 +96,7 @@ class Equations {
   /// F(t, y, y_dot) = 0. Allocates nothing.
   void residual(double t, const double* y, const double* y_dot, const JointMemory&, double* F);
   /// dF/dy + c dF/dy_dot.
-  void newton(double t, double c, const double* y, const double* y_dot, const JointMemory&, Assembly&);
+  void newton(double t, double c, const double* y, const double* y_dot, const JointMemory&, PatternSum&);
 
   /// Values, rates of all rows, and the part of their second derivative that is no acceleration's.
   struct RowValues {
@@ -142,8 +142,8 @@ class Equations {
   void scatter_correction(const PlaceData&, const PlaceForce<double>&, const double* y, double* F) const;
   RowMultipliers multipliers(const JointData&, const double* y) const;
   void body_residual(size_t i, const double* y, const double* y_dot, double* F);
-  void body_newton(size_t i, double t, double c, const double* y, const double* y_dot, Assembly&);
-  void pair_newton(const JointData&, const Eigen::MatrixXd& derivatives, bool velocities, const double* y, Assembly&);
+  void body_newton(size_t i, double t, double c, const double* y, const double* y_dot, PatternSum&);
+  void pair_newton(const JointData&, const Eigen::MatrixXd& derivatives, bool velocities, const double* y, PatternSum&);
 
   const Prepared& prepared_;
   const Multibody& scene_;

@@ -235,6 +235,8 @@ class MultipliersFlight final : public DaeProblem {
       ida_->step(limit(), t_, y_, crossed_);
     } catch (const NumericalError& error) {
       if (constraint_rank(equations_, t_, y_.data()).margin < 3e-2 * margin_) throw_locked();
+      const std::string body = body_without_inertia(equations_, t_, y_.data());
+      if (!body.empty()) throw NumericalError(fmt::format("t = {:.9g} s: {}", t_, body));
       throw;
     }
     if (++steps_ > options_.max_steps)
@@ -341,6 +343,7 @@ class MultipliersFlight final : public DaeProblem {
       } else if (crossed) {
         memory_.closed[joint] = !closed;
         result_.events.push_back({t_, static_cast<int>(joint), !closed, g.rate});
+        chatter_.contact(t_, scene_.joints[joint].name);
         changed = true;
         approach_[i].restart(g.rate);
         if (std::abs(g.rate) * period(i) < small(i) && !pushed(i, small(i))) settle(i);
@@ -467,10 +470,11 @@ class MultipliersFlight final : public DaeProblem {
   std::vector<char> armed_;    // per stop
   std::vector<int> crossed_;
   std::vector<Approach> approach_;  // per stop
-  std::vector<double> asleep_;      // motions below this do not wake a joint that has settled on its way [rad] or [m]
+  ChatterGuard chatter_;
+  std::vector<double> asleep_;  // motions below this do not wake a joint that has settled on its way [rad] or [m]
   std::vector<Clearance> before_;
   VectorXd y_, y_before_, y_dot_, sample_, rows_, rates_;
-  redundant::Assembly assembly_;
+  redundant::PatternSum assembly_;
   std::unique_ptr<FlightFrame> frame_;
   std::unique_ptr<StateScales> scales_;
   std::unique_ptr<Ida> ida_;

@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 using spatial::eigen;
 using spatial::vec3;
 
-void Assembly::finish(int size, bool dense) {
+void PatternSum::finish(int size, bool dense) {
   recording_ = false;
   count_ = places_.size();
   slots_.resize(count_);
@@ -43,7 +43,7 @@ void Assembly::finish(int size, bool dense) {
   std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
 }
 
-void Assembly::begin(double* values) {
+void PatternSum::begin(double* values) {
   values_ = values;
   next_ = 0;
   if (!recording_) std::fill(values, values + rows_.size(), 0.0);
@@ -203,7 +203,7 @@ MatrixXd Equations::mass(size_t i, const double* y) const {
   return M.selfadjointView<Eigen::Lower>();
 }
 
-void Equations::body_newton(size_t i, double t, double c, const double* y, const double* y_dot, Assembly& out) {
+void Equations::body_newton(size_t i, double t, double c, const double* y, const double* y_dot, PatternSum& out) {
   const BodyPlaces& at = places_[i];
   const BodyData& body = prepared_.bodies[i];
   const Index n = at.n;
@@ -272,7 +272,7 @@ void Equations::body_newton(size_t i, double t, double c, const double* y, const
   if (n > 0) out.add_block(dissipated_, at.u, -2 * Map<const VectorXd>(y + at.u, n).transpose() * body.De);
 }
 
-void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velocities, const double* y, Assembly& out) {
+void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velocities, const double* y, PatternSum& out) {
   const Index m = static_cast<Index>(j.rows.size());
   const std::array<const PlaceData*, 2> sides = {&j.a, &j.b};
   for (size_t side = 0; side < 2; ++side) {
@@ -323,7 +323,7 @@ void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velociti
 }
 
 void Equations::newton(double t, double c, const double* y, const double* y_dot, const JointMemory& memory,
-                       Assembly& out) {
+                       PatternSum& out) {
   for (size_t i = 0; i < places_.size(); ++i) body_newton(i, t, c, y, y_dot, out);
   for (size_t i = 0; i < joints_.size(); ++i) {
     const JointData& j = joints_[i];

@@ -5,6 +5,7 @@
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
@@ -47,6 +48,16 @@ std::vector<Index> kept_rows(const Equations& e) {
 }
 
 MatrixXd kept_gradient(Equations& e, double t, const double* y) { return e.gradient(t, y)(kept_rows(e), Eigen::all); }
+
+/// Block diagonal, over the freedoms of all bodies.
+MatrixXd mass_matrix(const Equations& e, const double* y) {
+  MatrixXd M = MatrixXd::Zero(e.freedoms(), e.freedoms());
+  for (size_t i = 0; i < e.places().size(); ++i) {
+    const BodyPlaces& at = e.places()[i];
+    M.block(at.freedom, at.freedom, 6 + at.n, 6 + at.n) = e.mass(i, y);
+  }
+  return M;
+}
 
 }  // namespace
 
@@ -101,6 +112,29 @@ RankReport constraint_rank(Equations& e, double t, const double* y) {
   for (size_t i = 0; i < names.size(); ++i)
     if (!report.kept[i]) report.left_out.push_back(names[i]);
   return report;
+}
+
+std::string body_without_inertia(Equations& e, double t, const double* y) {
+  constexpr double enough = 1e-12;  // of the largest, in freedoms scaled to be alike
+  const Index n = e.freedoms();
+  if (n == 0 || !Map<const VectorXd>(y, e.size()).allFinite()) return "";
+  const VectorXd root = e.inverse_metric().cwiseSqrt();
+  const MatrixXd rows = root.asDiagonal() * kept_gradient(e, t, y).transpose();
+  MatrixXd free = MatrixXd::Identity(n, n);
+  if (rows.cols() > 0) free = Eigen::ColPivHouseholderQR<MatrixXd>(rows).householderQ() * free;
+  free = (root.asDiagonal() * free.rightCols(n - rows.cols())).eval();
+  if (free.cols() == 0) return "";
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> inertia(free.transpose() * mass_matrix(e, y) * free);
+  const VectorXd& of = inertia.eigenvalues();
+  if (of(0) > enough * of(of.size() - 1)) return "";
+  const VectorXd motion = (free * inertia.eigenvectors().col(0)).cwiseQuotient(root);
+  const auto share = [&](const BodyPlaces& at) { return motion.segment(at.freedom, 6 + at.n).norm(); };
+  const auto most = std::ranges::max_element(e.places(), {}, share);
+  const ReducedBody& body = e.scene().bodies[static_cast<size_t>(most - e.places().begin())];
+  return fmt::format(
+      "the mass matrix of body {} is not positive definite in a motion that the joints leave free: too "
+      "little inertia to compute with; give it inertia there, or fewer modes",
+      body.name);
 }
 
 std::string locked_joint(Equations& e, double t, const double* y) {
@@ -222,11 +256,8 @@ void Equations::make_consistent(double t, VectorXd& y, VectorXd& y_dot, const Jo
   MatrixXd K = MatrixXd::Zero(n + m, n + m);
   VectorXd b(n + m), scale(n + m);
   scale.head(n) = inverse_metric_.cwiseSqrt();
-  for (size_t i = 0; i < places_.size(); ++i) {
-    const BodyPlaces& at = places_[i];
-    K.block(at.freedom, at.freedom, 6 + at.n, 6 + at.n) = mass(i, y.data());
-    b.segment(at.freedom, 6 + at.n) = -F.segment(at.v, 6 + at.n);
-  }
+  K.topLeftCorner(n, n) = mass_matrix(*this, y.data());
+  for (const BodyPlaces& at : places_) b.segment(at.freedom, 6 + at.n) = -F.segment(at.v, 6 + at.n);
   if (m > 0) {
     RowValues values;
     row_values(t, y.data(), values);
@@ -241,11 +272,12 @@ void Equations::make_consistent(double t, VectorXd& y, VectorXd& y_dot, const Jo
   VectorXd x = lu.solve(VectorXd(scale.cwiseProduct(b)));
   x += lu.solve(VectorXd(scale.cwiseProduct(b) - K * x));
   x = scale.cwiseProduct(x);
+  if (!x.allFinite() || lu.rcond() < 1e-14) {
+    const std::string body = body_without_inertia(*this, t, y.data());
+    if (!body.empty()) throw NumericalError(fmt::format("t = {:.9g} s: {}", t, body));
+  }
   if (!x.allFinite())
-    throw NumericalError(
-        fmt::format("at t = {:.9g} s the accelerations are not determined: a body without inertia "
-                    "about a free axis, or dependent constraints",
-                    t));
+    throw NumericalError(fmt::format("at t = {:.9g} s the accelerations are not determined: dependent constraints", t));
   for (const BodyPlaces& at : places_) {
     y_dot.segment(at.v, 6 + at.n) = x.segment(at.freedom, 6 + at.n);
     y_dot.segment(at.R, 3) = y.segment<3>(at.v);

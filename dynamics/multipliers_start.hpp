@@ -30,6 +30,10 @@ RankReport constraint_rank(Equations&, double t, const double* y);
 /// by.
 std::string locked_joint(Equations&, double t, const double* y);
 
+/// The body that moves most where the mass matrix of what the constraints leave free has no, or negative, inertia;
+/// empty where it has enough.
+std::string body_without_inertia(Equations&, double t, const double* y);
+
 /// Names the row with the largest violation.
 struct Violation {
   double position = 0, angle = 0;  // [m], [rad]; or per second

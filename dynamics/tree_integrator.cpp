@@ -235,6 +235,7 @@ class TreeFlight {
         if (!slipped) gap = 0;  // on the stop, exactly: the root is good to round-off of t
         closed_[i] = contact;
         result_.events.push_back({t_, joint, contact, rate});
+        chatter_.contact(t_, tree_.scene().joints[static_cast<size_t>(joint)].name);
         changed = true;
         approach_[i].restart(rate);
         if (std::abs(rate) * period(i) < small(i) && !pushed(i)) settle(i);
@@ -348,6 +349,7 @@ class TreeFlight {
   std::vector<char> closed_, armed_;
   std::vector<int> crossed_;
   std::vector<Approach> approach_;
+  ChatterGuard chatter_;
   std::vector<StopHistory> history_;  // per joint
   double t_;
   VectorXd y_, next_y_, y_dot_;

@@ -27,8 +27,10 @@ MeshFile from_memory(const fs::path& path, const ReadOptions&) {
   return read(file_bytes(path), path.string());
 }
 
+// A deck: it is read differently with options.
+template <MeshFile (*read)(std::string_view text, const std::string& file, const ReadOptions&)>
 MeshFile read_deck(const fs::path& path, const ReadOptions& options) {
-  return read_abaqus(file_bytes(path), path.string(), options.dialect);
+  return read(file_bytes(path), path.string(), options);
 }
 
 void write_deck(const fs::path& path, const Mesh& mesh) { write_abaqus(path, mesh, std::nullopt); }
@@ -41,8 +43,8 @@ constexpr std::array<std::string_view, 4> geometry_extensions = {".step", ".stp"
 
 constexpr std::array<MeshFormat, 5> formats{{
     {"Gmsh", gmsh_extensions, from_memory<read_gmsh>, write_gmsh},
-    {"CalculiX and Abaqus", abaqus_extensions, read_deck, write_deck},
-    {"Nastran", nastran_extensions, from_memory<read_nastran>, nullptr},
+    {"CalculiX and Abaqus", abaqus_extensions, read_deck<read_abaqus>, write_deck},
+    {"Nastran", nastran_extensions, read_deck<read_nastran>, nullptr},
     {"VTK", vtk_extensions, from_memory<read_vtu>, write_vtu},
     {"geometry, meshed by gmsh", geometry_extensions, mesh_with_gmsh, nullptr},
 }};
@@ -85,9 +87,14 @@ MeshFile read_mesh(const fs::path& path, const ReadOptions& options) {
     throw InputError(fmt::format("{}: mesh files of extension \"{}\" are not read; there are {}", path.string(),
                                  path.extension().string(), extensions_with(reads)));
   }
-  require(!options.dialect || format->read == read_deck,
+  require(!options.dialect || format->read == read_deck<read_abaqus>,
           fmt::format("{}: a dialect (calculix, abaqus) is of decks (.inp)", path.string()));
-  return format->read(path, options);
+  MeshFile file = format->read(path, options);
+  if (options.material) {
+    for (SolidProperty& p : file.mesh.solid_properties) p.material = *options.material;
+    for (BeamProperty& p : file.mesh.beam_properties) p.material = *options.material;
+  }
+  return file;
 }
 
 void write_mesh(const fs::path& path, const Mesh& mesh) {

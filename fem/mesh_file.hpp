@@ -17,8 +17,9 @@ std::string_view name_of(Dialect);
 
 /// What is said beside a file.
 struct ReadOptions {
-  std::optional<Dialect> dialect;  // of a deck; nothing: what the deck tells, where it matters
-  bool trust = false;              // a .geo file may run commands and write files
+  std::optional<Dialect> dialect;    // of a deck; nothing: what the deck tells, where it matters
+  bool trust = false;                // a .geo file may run commands and write files
+  std::optional<Material> material;  // of everything, instead of the file's, which is not even read
 };
 
 /// What a mesh file holds beside the mesh.

@@ -200,7 +200,7 @@ void read_keyword(Deck& deck, const Keyword& keyword) {
 }  // namespace
 
 Dialect Deck::dialect(std::string_view at, std::string_view difference) {
-  if (given_dialect) return *given_dialect;
+  if (options.dialect) return *options.dialect;
   if (!signs_) signs_ = dialect_signs(text_, file_);
   const auto& [calculix, abaqus] = *signs_;
   if (calculix.empty() == abaqus.empty())
@@ -264,8 +264,8 @@ std::optional<long> Deck::number(const Reference& reference) const {
 
 }  // namespace abaqus
 
-MeshFile read_abaqus(std::string_view text, const std::string& file, std::optional<Dialect> dialect) {
-  abaqus::Deck deck(text, file, dialect);
+MeshFile read_abaqus(std::string_view text, const std::string& file, const ReadOptions& options) {
+  abaqus::Deck deck(text, file, options);
   if (deck.lines.next_data() != nullptr)
     deck.fail(deck.lines.line(),
               fmt::format("a deck begins with a keyword such as *NODE, not with {}", quoted(deck.lines.line())));

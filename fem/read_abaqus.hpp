@@ -2,7 +2,6 @@
 
 #include "fem/mesh_file.hpp"
 
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -13,8 +12,9 @@ namespace flexboom {
 /// keyword means something else to each of the two programs, the dialect decides; where none is given, what the deck
 /// tells about the program that it was written for.
 /// @param file path of the text: what *INCLUDE is relative to, and its name in messages.
+/// @param options the dialect, and a material with which the deck's own may be missing.
 /// @throws InputError file:line:column, also for faults in an included file, and where a dialect is needed and not
 /// told.
-MeshFile read_abaqus(std::string_view text, const std::string& file, std::optional<Dialect> = {});
+MeshFile read_abaqus(std::string_view text, const std::string& file, const ReadOptions& = {});
 
 }  // namespace flexboom

@@ -129,7 +129,7 @@ void read_coupling(Deck& deck, const Keyword& keyword) {
     coupling.components[0] = coupling.components[1] = coupling.components[2] = true;
   } else {
     const Components& c = coupling.components;
-    if (deck.given_dialect == Dialect::calculix && (c[3] || c[4] || c[5]))
+    if (deck.options.dialect == Dialect::calculix && (c[3] || c[4] || c[5]))
       deck.fail(kind->at, "*KINEMATIC takes degrees of freedom 1 to 3 in CalculiX");
     if (turned && !(c[0] && c[1] && c[2]))
       deck.fail(keyword.at, "*COUPLING with ORIENTATION is understood if it takes degrees of freedom 1 to 3");
@@ -196,7 +196,7 @@ void read_mpc(Deck& deck, const Keyword& keyword) {
         type == "BEAM" &&
         deck.dialect((*fields)[0], "*MPC BEAM is a rigid beam in Abaqus and keeps a distance alone in CalculiX") ==
             Dialect::calculix;
-    if (type != "BEAM" && deck.given_dialect == Dialect::calculix)
+    if (type != "BEAM" && deck.options.dialect == Dialect::calculix)
       deck.fail((*fields)[0], fmt::format("*MPC {} is not known to CalculiX", type));
     deck.mpcs.push_back({keeps_distance ? "LINK" : type, deck.reference(unquoted((*fields)[1])),
                          deck.reference(unquoted((*fields)[2])), (*fields)[0]});

@@ -157,8 +157,8 @@ struct Instance {
 };
 
 struct Deck {
-  Deck(std::string_view text, const std::string& file, std::optional<Dialect> dialect)
-      : lines(text, file), given_dialect(dialect), text_(text), file_(file) {}
+  Deck(std::string_view text, const std::string& file, const ReadOptions& given)
+      : lines(text, file), options(given), text_(text), file_(file) {}
 
   [[noreturn]] void fail(std::string_view at, const std::string& message) const { lines.text().fail(at, message); }
 
@@ -182,7 +182,7 @@ struct Deck {
   std::optional<long> number(const Reference&) const;
 
   Lines lines;
-  std::optional<Dialect> given_dialect;
+  ReadOptions options;
   Notes notes;
   bool has_long_number = false;  // one that CalculiX cuts off
 

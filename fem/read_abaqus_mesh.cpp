@@ -102,7 +102,9 @@ std::vector<int> add_properties(const Lookup& lookup, Mesh& mesh) {
     Material material = section.beam.material;
     double temperature = 0;
     std::string name;
-    if (!section.material.empty()) {
+    if (deck.options.material) {
+      material = *deck.options.material;
+    } else if (!section.material.empty()) {
       const MaterialLines& lines = material_lines(deck, section);
       name = lines.name;
       if (lines.depends_on_temperature()) {
@@ -184,7 +186,7 @@ void add_elements(Lookup& lookup, Mesh& mesh) {
   Deck& deck = lookup.deck();
   const std::vector<int> property = add_properties(lookup, mesh);
   assign_sections(lookup);
-  const bool without_sections = deck.sections.empty() && deck.materials.empty();
+  const bool without_sections = deck.sections.empty() && (deck.materials.empty() || deck.options.material);
   std::map<std::string_view, int> types;
   std::map<std::string_view, int> left_out;
   lookup.mesh_element.assign(deck.elements.size(), -1);
@@ -201,7 +203,7 @@ void add_elements(Lookup& lookup, Mesh& mesh) {
                                      line.kind->role == Role::beam ? "BEAM" : "SOLID"));
     if (later && mesh.solid_properties.empty()) {
       mesh.solid_properties.push_back({"solid", {}});
-      deck.notes.add("the deck has no material; give it one");
+      if (!deck.options.material) deck.notes.add("the deck has no material; give it one");
     }
     if (line.kind != last_kind) type = element_type(line.kind->row);
     last_kind = line.kind;

@@ -57,7 +57,7 @@ SectionShape round_bar(Deck& deck, const std::vector<double>& d, std::string_vie
         deck.dialect(at, "SECTION=CIRC with one number is a diameter in CalculiX and a radius in Abaqus");
     return RoundBar{dialect == Dialect::calculix ? d[0] : 2 * d[0]};
   }
-  if (deck.given_dialect == Dialect::abaqus) deck.fail(at, "SECTION=CIRC takes one number in Abaqus, the radius");
+  if (deck.options.dialect == Dialect::abaqus) deck.fail(at, "SECTION=CIRC takes one number in Abaqus, the radius");
   deck.notes.add("SECTION=CIRC with two numbers is read as CalculiX does: diameters, not radii");
   if (d.size() != 2 || d[0] != d[1])
     deck.fail(at, "SECTION=CIRC needs two equal diameters (ellipses are not understood)");
@@ -119,6 +119,7 @@ void read_material(Deck& deck, const Keyword& keyword) {
 }
 
 void read_elastic(Deck& deck, const Keyword& keyword) {
+  if (deck.options.material) return;
   deck.lines.allow(keyword, {"TYPE", "DEPENDENCIES", "MODULI"});
   MaterialLines& material = material_of(deck, keyword);
   const std::string type = upper_key(keyword.find("TYPE").value_or("ISO"));
@@ -139,6 +140,7 @@ void read_elastic(Deck& deck, const Keyword& keyword) {
 }
 
 void read_density(Deck& deck, const Keyword& keyword) {
+  if (deck.options.material) return;
   deck.lines.allow(keyword, {"DEPENDENCIES"});
   MaterialLines& material = material_of(deck, keyword);
   material.density.clear();

@@ -125,8 +125,8 @@ void read_card(Bulk& bulk, const Card& card) {
 }  // namespace
 }  // namespace nastran
 
-MeshFile read_nastran(std::string_view text, const std::string& file) {
-  nastran::Bulk bulk(text, file);
+MeshFile read_nastran(std::string_view text, const std::string& file, const ReadOptions& options) {
+  nastran::Bulk bulk(text, file, options.material);
   while (const nastran::Card* card = bulk.cards.next()) nastran::read_card(bulk, *card);
   if (bulk.cards.case_control().other_spc) bulk.notes.add("subcases select different SPC sets; the first is used");
   return nastran::mesh_of(bulk);

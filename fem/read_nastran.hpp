@@ -12,6 +12,6 @@ namespace flexboom {
 /// (MeshFile::notes). Frequencies asked for by EIGRL or EIGR become MeshFile::modes.
 /// @param file path of the text: what INCLUDE is relative to, and its name in messages.
 /// @throws InputError file:line:column, also for faults in an included file.
-MeshFile read_nastran(std::string_view text, const std::string& file);
+MeshFile read_nastran(std::string_view text, const std::string& file, const ReadOptions& = {});
 
 }  // namespace flexboom

@@ -98,12 +98,14 @@ struct MassLine {
 };
 
 struct Bulk {
-  Bulk(std::string_view text, const std::string& file) : cards(text, file) {}
+  Bulk(std::string_view text, const std::string& file, const std::optional<Material>& given)
+      : cards(text, file), material(given) {}
 
   [[noreturn]] void fail(std::string_view at, const std::string& message) const { cards.fail(at, message); }
 
   Cards cards;
   Notes notes;
+  std::optional<Material> material;  // of everything, instead of the file's
 
   DeckNodes nodes;
   std::vector<Grid> grids;  // as the nodes that were added

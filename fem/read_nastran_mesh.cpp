@@ -67,6 +67,7 @@ class Systems {
 };
 
 const Material& material_of(const Bulk& bulk, long id, std::string_view at) {
+  if (bulk.material) return *bulk.material;
   const auto found = bulk.materials.find(id);
   if (found == bulk.materials.end()) bulk.fail(at, fmt::format("material {} is not defined", id));
   if (!found->second.refusal.empty()) bulk.fail(found->second.at, found->second.refusal);

@@ -154,6 +154,7 @@ void read_pbeam(Bulk& bulk, const Card& card) {
 }
 
 void read_mat1(Bulk& bulk, const Card& card) {
+  if (bulk.material) return;
   const auto read = [&](size_t i, std::string_view what) -> std::optional<double> {
     if (card.blank(i)) return {};
     return bulk.cards.real(card, i, what);

@@ -1,17 +1,15 @@
 #pragma once
 
+#include "reduction/hdf5_image.hpp"
 #include "reduction/sha256.hpp"
-
-#include <hdf5.h>
 
 #include <cstdint>
 #include <map>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
-// HDF5 files in memory, as far as body files need them. The only door to the HDF5 library.
+// HDF5 files in memory, as far as body files need them.
 namespace flexboom {
 
 /// One dataset: its path in the file and what it says about itself.
@@ -20,46 +18,6 @@ struct Field {
   std::string units;        // SI; "q": unit of a coordinate, "1": none, empty: text
   std::string description;  // one line
   bool finite = true;       // whether NaN and infinities are faults
-};
-
-using Shape = std::vector<std::uint64_t>;
-
-/// "3 x 4"; "a single value" of an empty shape.
-std::string text_of(const Shape&);
-
-/// Number of entries. @throws InputError above `limit`.
-std::uint64_t entries(const Shape&, std::uint64_t limit, const std::string& name);
-
-/// A handle of the library and how it is closed.
-class Handle {
- public:
-  /// @throws InputError with `fault` if the library gave no handle.
-  Handle(hid_t id, herr_t (*close)(hid_t), const std::string& fault);
-  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
-  ~Handle() {
-    if (id_ >= 0) close_(id_);
-  }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  Handle& operator=(Handle&&) = delete;
-  operator hid_t() const { return id_; }  // for the C functions
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
-
-/// While it lives, the library prints no errors of its own.
-class SilentHdf5 {
- public:
-  SilentHdf5();
-  ~SilentHdf5();
-  SilentHdf5(const SilentHdf5&) = delete;
-  SilentHdf5& operator=(const SilentHdf5&) = delete;
-
- private:
-  H5E_auto2_t function_ = nullptr;
-  void* data_ = nullptr;
 };
 
 /// Digest of names, types, shapes, bytes, units and descriptions, whatever the order and the layout of the file.
@@ -93,8 +51,6 @@ class Hdf5Writer {
  private:
   SilentHdf5 silent_;
   size_t head_;
-  Handle access_;
-  Handle creation_;
   Handle file_;
   ContentDigest content_;
 };
@@ -121,7 +77,6 @@ class Hdf5Reader {
 
   SilentHdf5 silent_;
   std::uint64_t size_;
-  Handle access_;
   Handle file_;
   ContentDigest content_;
 };

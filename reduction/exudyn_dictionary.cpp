@@ -2,13 +2,11 @@
 
 #include "fem/check.hpp"
 #include "fem/files.hpp"
-#include "reduction/body_file_hdf5.hpp"
+#include "reduction/hdf5_image.hpp"
 
-#include <hdf5.h>
+#include <fmt/format.h>
 
-#include <array>
 #include <cstdint>
-#include <span>
 
 namespace flexboom {
 namespace {
@@ -20,37 +18,15 @@ void check(bool condition, const std::string& what) { require(condition, "HDF5: 
 
 Handle handle(hid_t id, herr_t (*close)(hid_t), const std::string& what) { return {id, close, "HDF5: cannot " + what}; }
 
-Handle text_type() {
-  Handle type = handle(H5Tcopy(H5T_C_S1), H5Tclose, "make a type of text");
-  check(H5Tset_size(type, H5T_VARIABLE) >= 0 && H5Tset_cset(type, H5T_CSET_UTF8) >= 0, "make a type of text");
-  return type;
-}
-
-Handle property_list(hid_t kind) {
-  Handle list = handle(H5Pcreate(kind), H5Pclose, "make a property list");
-  check(H5Pset_obj_track_times(list, false) >= 0, "leave out times");  // equal content, equal bytes
-  return list;
-}
-
-void write_datatype(hid_t object, const char* python_type) {
-  const Handle type = text_type();
-  const Handle space = handle(H5Screate(H5S_SCALAR), H5Sclose, "make a scalar");
-  const Handle attribute =
-      handle(H5Acreate2(object, "datatype", type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, "make an attribute");
-  check(H5Awrite(attribute, type, &python_type) >= 0, "write an attribute");
-}
-
 void write_dataset(hid_t parent, const std::string& name, const char* python_type, hid_t file_type, hid_t memory_type,
-                   std::span<const hsize_t> shape, const void* data) {
-  const Handle space = handle(
-      shape.empty() ? H5Screate(H5S_SCALAR) : H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
-      H5Sclose, "make a shape");
+                   const Shape& shape, const void* data) {
+  const Handle space = space_of(shape);
   const Handle properties = property_list(H5P_DATASET_CREATE);
   const Handle dataset =
       handle(H5Dcreate2(parent, name.c_str(), file_type, space, H5P_DEFAULT, properties, H5P_DEFAULT), H5Dclose,
              "make " + name);
   check(H5Dwrite(dataset, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0, "write " + name);
-  write_datatype(dataset, python_type);
+  put_text(dataset, "datatype", python_type);
 }
 
 /// Writes one value under its name.
@@ -75,16 +51,14 @@ struct Writer {
     }
   }
   void operator()(const Eigen::VectorXd& value) const {
-    const std::array shape = {static_cast<hsize_t>(value.size())};
-    write_dataset(parent, name, "ndarray", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, shape, value.data());
+    write_dataset(parent, name, "ndarray", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, shape_of(value), value.data());
   }
   void operator()(const Eigen::MatrixXd& value) const {
     const RowMajor rows = value;
     write_dataset(parent, name, "ndarray", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, shape_of(value), rows.data());
   }
   void operator()(const IntegerVector& value) const {
-    const std::array shape = {static_cast<hsize_t>(value.size())};
-    write_dataset(parent, name, "ndarray", H5T_STD_I64LE, H5T_NATIVE_LONG, shape, value.data());
+    write_dataset(parent, name, "ndarray", H5T_STD_I64LE, H5T_NATIVE_LONG, shape_of(value), value.data());
   }
   void operator()(const IntegerMatrix& value) const {
     const IntegerRowMajor rows = value;
@@ -94,40 +68,30 @@ struct Writer {
 
  private:
   template <class Matrix>
-  static std::array<hsize_t, 2> shape_of(const Matrix& value) {
-    return {static_cast<hsize_t>(value.rows()), static_cast<hsize_t>(value.cols())};
+  static Shape shape_of(const Matrix& value) {
+    if constexpr (Matrix::ColsAtCompileTime == 1) return {static_cast<std::uint64_t>(value.size())};
+    return {static_cast<std::uint64_t>(value.rows()), static_cast<std::uint64_t>(value.cols())};
   }
 
   Handle group(const char* python_type) const {
     const Handle properties = property_list(H5P_GROUP_CREATE);
     Handle made =
         handle(H5Gcreate2(parent, name.c_str(), H5P_DEFAULT, properties, H5P_DEFAULT), H5Gclose, "make " + name);
-    write_datatype(made, python_type);
+    put_text(made, "datatype", python_type);
     return made;
   }
 };
 
-/// The bytes of a file that the library builds in memory.
 std::string file_image(const ExudynDictionary& dictionary) {
-  const Handle access = handle(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "make a property list");
-  check(H5Pset_fapl_core(access, size_t{1} << 16, false) >= 0, "work in memory");
-  const Handle creation = property_list(H5P_FILE_CREATE);
-  const Handle file = handle(H5Fcreate("exudyn", H5F_ACC_TRUNC, creation, access), H5Fclose, "make a file");
+  const Handle file = new_image(0);
   for (const auto& [name, value] : dictionary) std::visit(Writer{file, name}, value);
-  check(H5Fflush(file, H5F_SCOPE_GLOBAL) >= 0, "finish the file");
-  const ssize_t size = H5Fget_file_image(file, nullptr, 0);
-  check(size > 0, "measure the file");
-  std::string bytes(static_cast<size_t>(size), '\0');
-  check(H5Fget_file_image(file, bytes.data(), bytes.size()) == size, "copy the file");
-  return bytes;
+  return image_bytes(file, 0);
 }
 
 /// Reads the entries of one open file.
 class Reader {
  public:
-  explicit Reader(const std::filesystem::path& path)
-      : file_(handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, "open it: it is no HDF5 file")),
-        bytes_(std::filesystem::file_size(path)) {}
+  explicit Reader(const std::string& bytes) : file_(open_image(bytes)), size_(bytes.size()) {}
 
   ExudynDictionary all() const {
     ExudynDictionary dictionary;
@@ -160,7 +124,8 @@ class Reader {
     }
     if (H5Iget_type(object) != H5I_DATASET) return;
     const Handle type = handle(H5Dget_type(object), H5Tclose, "read the type of " + name);
-    const std::vector<hsize_t> shape = shape_of(object, name);
+    const Shape shape = shape_of(object, size_, name);  // nothing in these files is compressed
+    check(shape.size() <= 2, fmt::format("use {}: it has {} axes, at most 2 are known", name, shape.size()));
     switch (H5Tget_class(type)) {
       case H5T_STRING:
         if (shape.empty()) dictionary[name] = text(object, name);
@@ -176,22 +141,8 @@ class Reader {
     }
   }
 
-  std::vector<hsize_t> shape_of(hid_t dataset, const std::string& name) const {
-    const Handle space = handle(H5Dget_space(dataset), H5Sclose, "read the shape of " + name);
-    const int axes = H5Sget_simple_extent_ndims(space);
-    check(axes >= 0 && axes <= 2, "use " + name + ": it has " + std::to_string(axes) + " axes, at most 2 are known");
-    std::vector<hsize_t> shape(static_cast<size_t>(axes));
-    check(H5Sget_simple_extent_dims(space, shape.data(), nullptr) == axes, "read the shape of " + name);
-    hsize_t room = bytes_;  // nothing in these files is compressed
-    for (const hsize_t n : shape) {
-      check(n <= room, "use " + name + ": it claims to be larger than the file");
-      if (n > 0) room /= n;
-    }
-    return shape;
-  }
-
   template <class Number, class Vector, class Rows, class Matrix>
-  static ExudynValue numbers(hid_t dataset, const std::string& name, const std::vector<hsize_t>& shape) {
+  static ExudynValue numbers(hid_t dataset, const std::string& name, const Shape& shape) {
     const auto size = [&](size_t axis) { return axis < shape.size() ? static_cast<Eigen::Index>(shape[axis]) : 1; };
     Rows rows(size(0), size(1));
     const hid_t type = std::is_same_v<Number, double> ? H5T_NATIVE_DOUBLE : H5T_NATIVE_LONG;
@@ -204,12 +155,10 @@ class Reader {
   static std::string text(hid_t dataset, const std::string& name) {
     const Handle stored = handle(H5Dget_type(dataset), H5Tclose, "read the type of " + name);
     check(H5Tis_variable_str(stored) > 0, "read " + name + ": a text of variable length is expected");
-    const Handle type = text_type();
-    char* value = nullptr;
-    check(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) >= 0 && value != nullptr, "read " + name);
-    std::string copy(value);
-    H5free_memory(value);
-    return copy;
+    const Handle type = text_type(), space = space_of({});
+    TextBuffer buffer(1, type, space);
+    check(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, buffer.texts.data()) >= 0, "read " + name);
+    return buffer.strings().front();
   }
 
   std::vector<std::string> list(hid_t group, const std::string& name) const {
@@ -224,7 +173,7 @@ class Reader {
   }
 
   Handle file_;
-  std::uintmax_t bytes_;
+  std::uint64_t size_;
 };
 
 }  // namespace
@@ -235,12 +184,10 @@ void write_exudyn_dictionary(const std::filesystem::path& path, const ExudynDict
 }
 
 ExudynDictionary read_exudyn_dictionary(const std::filesystem::path& path) {
-  require_regular_file(path);
   const SilentHdf5 silent;
-  std::error_code error;
-  require(std::filesystem::is_regular_file(path, error), "cannot read " + path.string() + ": there is no such file");
+  const std::string bytes = file_bytes(path);
   try {
-    return Reader(path).all();
+    return Reader(bytes).all();
   } catch (const InputError& fault) {
     throw InputError(path.string() + ": " + fault.what());
   }

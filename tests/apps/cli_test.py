@@ -223,6 +223,77 @@ class BadInput(Case):
     def test_compare_needs_a_uniform_boom(self):
         self.assert_refused("compare", MESHES / "stepped_boom.toml", words="uniform")
 
+    def test_only_files_are_read(self):
+        """A pipe that nobody writes to would be waited for, a device never ends."""
+        pipe = self.folder / "pipe"
+        os.mkfifo(pipe)
+        for source in (pipe, pathlib.Path("/dev/zero")):
+            for command, extension in (("check", "toml"), ("run", "toml"), ("modes", "toml"), ("modes", "inp"),
+                                       ("modes", "bdf"), ("modes", "msh"), ("modes", "vtu"), ("modes", "geo"),
+                                       ("reduce", "inp"), ("compare", "toml")):
+                link = self.folder / f"{source.name}.{extension}"
+                if not link.is_symlink():
+                    link.symlink_to(source)
+                self.assert_refused(command, link, *(("-o", "x.h5") if command == "reduce" else ()),
+                                    words=": it is a device, pipe or socket, not a file")
+        scene = self.folder / "scene.toml"
+        text = (MESHES / "panel-slew.toml").read_text()
+        scene.write_text(text + '\n[[bodies]]\nname = "extra"\nfile = "body.h5"\n'
+                         '[[joints]]\nname = "extra"\nkind = "fixed"\nb = { body = "extra", marker = "root" }\n')
+        (self.folder / "body.h5").symlink_to(pipe)
+        self.assert_refused("check", scene, words="it is a device, pipe or socket, not a file")
+
+    def test_large_scenes_are_checked_in_little_memory(self):
+        def limited(text):
+            scene = self.folder / "large.toml"
+            scene.write_text(text)
+            limit = 6 << 30
+            return flexboom("check", scene, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
+
+        text = (MESHES / "two-link-arm.toml").read_text()
+        first, rest = text.index("[[bodies]]"), text.index("[[joints]]")
+        body = text[first:text.index("[[bodies]]", first + 1)]
+        many = [body.replace('"upper"', f'"b{i}"') for i in range(50_000)]
+        result = limited(text[:first] + "".join(many) + text[rest:])
+        self.assert_exit(INPUT, result)
+        self.assertIn("bodies: has 50000 entries", result.stderr)
+        self.assert_exit(OK, limited(text.replace("length = 0.6", "length = 0.6\nelements = 100000")))
+
+    def test_a_deck_that_two_programs_read_differently(self):
+        deck = self.folder / "bar.inp"
+        deck.write_text("*NODE\n1,0,0,0\n2,0.25,0,0\n3,0.5,0,0\n*ELEMENT,TYPE=B31,ELSET=E\n1,1,2\n2,2,3\n"
+                        "*MATERIAL,NAME=M\n*ELASTIC\n7e10,.3\n*DENSITY\n2700\n"
+                        "*BEAM SECTION,ELSET=E,MATERIAL=M,SECTION=CIRC\n0.01\n0,0,-1\n*BOUNDARY\n1,1,6\n")
+        self.assert_refused("modes", deck, words="say --dialect calculix or --dialect abaqus")
+        mass = {}
+        for dialect in ("calculix", "abaqus"):
+            result = flexboom("modes", deck, "--count", "1", "--dialect", dialect, "--json")
+            self.assert_exit(OK, result)
+            mass[dialect] = json.loads(result.stdout)["mass"]
+        self.assertAlmostEqual(mass["calculix"], math.pi / 4 * 0.01**2 * 0.5 * 2700, delta=1e-12)
+        self.assertAlmostEqual(mass["abaqus"] / mass["calculix"], 4, delta=1e-12)
+        self.assert_refused("modes", BOOM4, "--dialect", "abaqus", words="--dialect")
+        result = flexboom("modes", deck, "--dialect", "ansys")
+        self.assertIn(result.returncode, (USAGE, INPUT))
+        self.assertIn("calculix", result.stderr)
+
+    def test_geometry_that_runs_commands_is_not_trusted(self):
+        (self.folder / "inner.geo").write_text('NonBlockingSystemCall "touch ran";\n')
+        (self.folder / "outer.geo").write_text('Include "inner.geo";\nPoint(1) = {0, 0, 0, 1};\n')
+        (self.folder / "plain.geo").write_text('SystemCall "touch ran";\n')
+        for name in ("plain.geo", "outer.geo"):
+            self.assert_refused("modes", name, words="--trust")
+        self.assertFalse((self.folder / "ran").exists())
+
+    def test_material_rescues_an_incomplete_card(self):
+        deck = self.folder / "tet.bdf"
+        deck.write_text("GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n"
+                        "CTETRA,1,1,1,2,3,4\nPSOLID,1,1\nMAT1,1,7.+10\n")
+        self.assert_refused("modes", deck, words="two of E, G and NU are needed")
+        result = flexboom("modes", deck, "--count", "7", "--material", "7e10,0.3,2700", "--json")
+        self.assert_exit(OK, result)
+        self.assertAlmostEqual(json.loads(result.stdout)["mass"], 450, delta=1e-9)
+
     def test_check_as_json_lists_the_faults(self):
         result = flexboom("check", TESTS / "apps" / "broken" / "several_faults.toml", "--json")
         self.assert_exit(INPUT, result)

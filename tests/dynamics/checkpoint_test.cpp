@@ -19,7 +19,7 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 /// One hinge's motion, whatever flew it.
 struct Motion {

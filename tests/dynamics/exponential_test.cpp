@@ -187,7 +187,7 @@ System sport_boom(int modes, double stiffness_scale = 1) {
   return System(hub, {{body, hinge}});
 }
 
-IntegratorOptions exponential(double tolerance, double duration) {
+IntegratorOptions exponential_options(double tolerance, double duration) {
   IntegratorOptions o;
   o.method = "exponential";
   o.tolerance = tolerance;
@@ -201,7 +201,7 @@ TEST(Exponential, AHingeWithoutASpringTurnsOn) {
   State s = system.at_rest({pi / 2 - 0.5});
   s.rate[0] = -0.3;
   const VectorXd y0 = system.pack(s);
-  IntegratorOptions o = exponential(1e-9, 3);
+  IntegratorOptions o = exponential_options(1e-9, 3);
   const Trajectory r = integrate(system, y0, o);
   o.method = "bdf";
   const Trajectory reference = integrate(system, y0, o);
@@ -215,7 +215,7 @@ TEST(Exponential, AgreesWithBdfFarFromWhereItWasLinearised) {
   State s = system.at_rest({pi / 2 - 1.2});
   s.omega = Vector3d(1, -2, 1.5);
   const VectorXd y0 = system.pack(s);
-  IntegratorOptions o = exponential(1e-9, 2);
+  IntegratorOptions o = exponential_options(1e-9, 2);
   const Trajectory r = integrate(system, y0, o);
   o.method = "bdf";
   const Trajectory reference = integrate(system, y0, o);
@@ -239,11 +239,11 @@ TEST(Exponential, ErrorIsThatOfTheTolerance) {
     else
       s.omega = Vector3d(1, -2, 1.5);
     const VectorXd y0 = system.pack(s);
-    const Trajectory reference = integrate(system, y0, exponential(1e-11, 0.5));
+    const Trajectory reference = integrate(system, y0, exponential_options(1e-11, 0.5));
     const auto shape = [&](const VectorXd& y) { return y.head(system.layout().p + system.layout().u); };
     long steps = 0;
     for (const double tolerance : {1e-3, 1e-5, 1e-7, 1e-9}) {
-      const Trajectory r = integrate(system, y0, exponential(tolerance, 0.5));
+      const Trajectory r = integrate(system, y0, exponential_options(tolerance, 0.5));
       EXPECT_GT(r.summary.steps, steps) << tolerance;
       steps = r.summary.steps;
       VectorXd size = VectorXd::Zero(shape(y0).size()), error = size;
@@ -261,10 +261,10 @@ TEST(Exponential, ErrorIsThatOfTheTolerance) {
 TEST(Exponential, LongStepsMissNoContact) {
   const System system = sport_boom(2);
   const VectorXd y0 = system.pack(system.at_rest({pi / 2 - pi / 60}));
-  IntegratorOptions fine = exponential(1e-9, 3);
+  IntegratorOptions fine = exponential_options(1e-9, 3);
   const Trajectory reference = integrate(system, y0, fine);
   for (const double tolerance : {1e-2, 1e-3, 1e-4}) {
-    IntegratorOptions o = exponential(tolerance, 3);
+    IntegratorOptions o = exponential_options(tolerance, 3);
     o.settle = 1e-11;
     const Trajectory r = integrate(system, y0, o);
     ASSERT_GT(reference.events.size(), 20U);
@@ -278,12 +278,12 @@ TEST(Exponential, MoreModesDoNotShrinkTheStep) {
   for (const int modes : {2, 4, 8, 16}) {
     const System system = sport_boom(modes);
     const VectorXd y0 = system.pack(system.at_rest({pi / 2 - pi / 60}));
-    const Trajectory r = integrate(system, y0, exponential(1e-4, 3));
+    const Trajectory r = integrate(system, y0, exponential_options(1e-4, 3));
     if (modes == 2) steps_with_2 = r.summary.steps;
     EXPECT_LT(10 * r.summary.steps, 13 * steps_with_2) << modes;
     EXPECT_LT(r.summary.energy_balance, 1e-4);
     // The hub, which all the modes shake, is as good as ever.
-    const Trajectory reference = integrate(system, y0, exponential(1e-8, 3));
+    const Trajectory reference = integrate(system, y0, exponential_options(1e-8, 3));
     const Layout& l = system.layout();
     for (const int place : {l.position(), l.attitude() + 1}) {
       double size = 0, error = 0;
@@ -304,7 +304,7 @@ TEST(Exponential, KeepsMomentaAtAnyTolerance) {
     for (const Vector3d& omega : {Vector3d(0, 0, 0), Vector3d(0.3, -0.2, 0.5)}) {
       s.omega = omega;
       s.velocity = Vector3d(0.1, 0.2, -0.3);
-      const Trajectory r = integrate(system, system.pack(s), exponential(tolerance, 2));
+      const Trajectory r = integrate(system, system.pack(s), exponential_options(tolerance, 2));
       EXPECT_GT(r.events.size(), 4U);
       // Where a step ends: the correction leaves its own square.
       const Balance &first = r.balance.front(), &last = r.balance.back();
@@ -319,10 +319,10 @@ TEST(Exponential, KeepsMomentaAtAnyTolerance) {
 TEST(Exponential, PlaceDoesNotActBack) {
   const System system = sport_boom(4);
   State s = system.at_rest({pi / 2 - pi / 60});
-  const Trajectory here = integrate(system, system.pack(s), exponential(1e-9, 2));
+  const Trajectory here = integrate(system, system.pack(s), exponential_options(1e-9, 2));
   s.position = Vector3d(1e7, -2e7, 3e6);
   s.velocity = Vector3d(7e3, 100, -3e3);
-  const Trajectory away = integrate(system, system.pack(s), exponential(1e-9, 2));
+  const Trajectory away = integrate(system, system.pack(s), exponential_options(1e-9, 2));
   ASSERT_EQ(away.time.size(), here.time.size());
   const Layout& l = system.layout();
   VectorXd size = VectorXd::Zero(l.p + l.u), error = size;
@@ -337,7 +337,7 @@ TEST(Exponential, PlaceDoesNotActBack) {
 TEST(Exponential, OutputsBetweenStepsAreOfTheSameQuality) {
   const System system = sport_boom(2);
   const VectorXd y0 = system.pack(system.at_rest({pi / 2 - pi / 60}));
-  IntegratorOptions o = exponential(1e-8, 0.3);
+  IntegratorOptions o = exponential_options(1e-8, 0.3);
   o.output_step = 0.0007;
   const Trajectory fine = integrate(system, y0, o);
   VectorXd size = VectorXd::Zero(y0.size());

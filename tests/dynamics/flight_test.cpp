@@ -40,6 +40,18 @@ TEST(OutputTimes, RoundOffMakesNoOutput) {
   }
 }
 
+TEST(ChatterGuard, AThousandContactsAtOneTimeAreAnErrorThatNamesTheJoint) {
+  ChatterGuard guard;
+  for (int i = 0; i < 5000; ++i) guard.contact(1e-3 * i, "slow");
+  for (int i = 0; i < 1000; ++i) guard.contact(5, "hinge");
+  try {
+    guard.contact(5 * (1 + 1e-15), "hinge");
+    ADD_FAILURE() << "no error";
+  } catch (const NumericalError& error) {
+    EXPECT_NE(std::string(error.what()).find("\"hinge\" chatters"), std::string::npos) << error.what();
+  }
+}
+
 TEST(FlightOptions, ThatMakeNoSenseAreNamed) {
   const auto refused = [](auto change) {
     FlightOptions o;

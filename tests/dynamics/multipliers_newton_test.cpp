@@ -123,7 +123,7 @@ TEST_P(NewtonMatrix, AgreesWithCentralDifferences) {
   const VectorXd y = c.random_state(e, true), y_dot = VectorXd::NullaryExpr(e.size(), [&] { return c.noise(); });
   const redundant::JointMemory memory = closed_stops(c.scene.joints.size());
   const double t = 0.3, factor = 1.7, h = 1e-5;
-  redundant::Assembly sparse, dense;
+  redundant::PatternSum sparse, dense;
   e.newton(t, factor, y.data(), y_dot.data(), memory, sparse);
   e.newton(t, factor, y.data(), y_dot.data(), memory, dense);
   sparse.finish(e.size(), false);

@@ -2,6 +2,7 @@
 
 #include "dynamics/second_order_shapes.hpp"
 
+#include "dynamics/multipliers.hpp"
 #include "dynamics/tree.hpp"
 #include "fem/boom.hpp"
 #include "fem/check.hpp"
@@ -91,11 +92,25 @@ TEST(SecondOrder, MassMatrixIsPositiveDefiniteHoweverTheBodyBends) {
 }
 
 // A thin rod on a universal joint: at a right angle the first axis of the joint is the rod itself.
-TEST(SecondOrder, SingularMassMatrixIsAnErrorThatNamesTheBody) {
+Multibody rod_on_a_gimbal() {
   Multibody scene;
   scene.bodies.push_back(rigid_body("rod", 2.0, Vector3d(0.5, 0, 0), Vector3d(0, 1, 1).asDiagonal()));
   scene.joints.push_back(testing::joint("gimbal", JointKind::universal, place(-1), place(0)));
-  const Tree tree(scene);
+  return scene;
+}
+
+template <class Run>
+void expect_numerical_error_naming_the_rod(const Run& run) {
+  try {
+    run();
+    ADD_FAILURE() << "no error";
+  } catch (const NumericalError& error) {
+    EXPECT_NE(std::string(error.what()).find("body rod"), std::string::npos) << error.what();
+  }
+}
+
+TEST(SecondOrder, SingularMassMatrixIsAnErrorThatNamesTheBody) {
+  const Tree tree(rod_on_a_gimbal());
   TreeState s = tree.at_rest();
   s.joints[0].coordinate = {0.3, 1.2};
   VectorXd y = tree.pack(s), y_dot(y.size());
@@ -103,12 +118,18 @@ TEST(SecondOrder, SingularMassMatrixIsAnErrorThatNamesTheBody) {
   tree.derivative(0, y.data(), open, *tree.workspace(), y_dot.data());
   s.joints[0].coordinate = {0.3, std::numbers::pi / 2};
   y = tree.pack(s);
-  try {
-    tree.derivative(0, y.data(), open, *tree.workspace(), y_dot.data());
-    ADD_FAILURE() << "no error";
-  } catch (const NumericalError& error) {
-    EXPECT_NE(std::string(error.what()).find("rod"), std::string::npos) << error.what();
-  }
+  expect_numerical_error_naming_the_rod([&] { tree.derivative(0, y.data(), open, *tree.workspace(), y_dot.data()); });
+}
+
+TEST(SecondOrder, SingularMassMatrixByMultipliersIsAnErrorThatNamesTheBody) {
+  const Multipliers system(rod_on_a_gimbal());
+  MultipliersOptions options;
+  options.duration = 0.1;
+  const auto fly = [&](double angle) {
+    return integrate_multipliers(system, place_bodies(system.multibody(), {{0.3, angle}}), options);
+  };
+  EXPECT_EQ(fly(1.2).time.back(), 0.1);
+  expect_numerical_error_naming_the_rod([&] { fly(std::numbers::pi / 2); });
 }
 
 }  // namespace

@@ -12,7 +12,9 @@ namespace {
 using Eigen::Vector3d;
 
 MeshFile read(const std::string& text, std::optional<Dialect> dialect = {}) {
-  return read_abaqus(text, "deck.inp", dialect);
+  ReadOptions options;
+  options.dialect = dialect;
+  return read_abaqus(text, "deck.inp", options);
 }
 
 bool says(const std::string& message, std::string_view part) { return message.find(part) != std::string::npos; }

@@ -24,7 +24,7 @@ std::string said(const std::string& first, const std::map<std::string, std::stri
   return message;
 }
 
-const std::string box = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\n";
+const std::string box_script = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\n";
 
 TEST(GmshScript, CommandsAreRefusedWhereverAndHoweverTheyStand) {
   for (const std::string command : {"SystemCall \"touch x\";",
@@ -54,11 +54,11 @@ TEST(GmshScript, CommandsAreRefusedWhereverAndHoweverTheyStand) {
                                     "Include name;",
                                     "ShapeFromFile(name);",
                                     "Merge \"a\" name;"}) {
-    const std::string message = said("a.geo", {{"a.geo", box + command}});
+    const std::string message = said("a.geo", {{"a.geo", box_script + command}});
     EXPECT_EQ(message.rfind("a.geo:", 0), 0U) << command << ": " << message;
     EXPECT_NE(message.find("--trust"), std::string::npos) << command << ": " << message;
   }
-  EXPECT_EQ(said("a.geo", {{"a.geo", box + "SystemCall \"touch x\";"}}),
+  EXPECT_EQ(said("a.geo", {{"a.geo", box_script + "SystemCall \"touch x\";"}}),
             "a.geo:3:1: \"SystemCall\" starts a program; add --trust if you know what this file does");
 }
 
@@ -86,7 +86,7 @@ TEST(GmshScript, WhatGmshWouldReadOtherwiseIsRefused) {
 
 TEST(GmshScript, PlainGeometryPasses) {
   const std::string text =
-      box +
+      box_script +
       "// SystemCall \"x\"; Save \"x\";\n/* Print \"x\"; */\nMesh.SaveAll = 1; Print.Width = 3;\n"
       "Save = 3; Printf(\"Save > SystemCall\"); DefineConstant[ n = {3, Name \"Parameters/n\"} ];\n"
       "Merge \"part.step\"; Merge \"old.msh\"; Include \"more.geo\"; Merge \"nowhere.geo\";\n"

@@ -9,6 +9,7 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <tuple>
 
 namespace flexboom::testing {
 namespace {
@@ -245,6 +246,40 @@ TEST(MeshFile, OnlyFilesAreRead) {
     for (const std::filesystem::path& path : {pipe, zero})
       EXPECT_EQ(input_error([&] { read_mesh(path); }),
                 "cannot read " + path.string() + ": it is a device, pipe or socket, not a file");
+  }
+}
+
+// Whatever a file says of its materials, or leaves out, does not matter then.
+TEST(MeshFile, AGivenMaterialTakesThePlaceOfTheFiles) {
+  const Folder folder;
+  const std::string grids =
+      "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\nCTETRA,1,1,1,2,3,4\nPSOLID,1,1\n";
+  const std::string nodes = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4,ELSET=E\n1,1,2,3,4\n";
+  const std::string section = "*SOLID SECTION,ELSET=E,MATERIAL=M\n";
+  const std::vector<std::pair<std::string, std::string>> files = {
+      {"incomplete.bdf", grids + "MAT1,1,7.+10,,,2700.\n"},
+      {"wrong.bdf", grids + "MAT1,1,-7.+10,,.3,-1.\n"},
+      {"anisotropic.bdf", grids + "MAT9,1,1.,2.,3.\n"},
+      {"none.bdf", grids},
+      {"complete.bdf", grids + "MAT1,1,1.,,.1,1.\n"},
+      {"incomplete.inp", nodes + "*MATERIAL,NAME=M\n*DENSITY\n2700\n" + section},
+      {"weightless.inp", nodes + "*MATERIAL,NAME=M\n*ELASTIC\n7e10,.3\n" + section},
+      {"anisotropic.inp", nodes + "*MATERIAL,NAME=M\n*ELASTIC,TYPE=ORTHO\n1,2,3,4,5,6,7,8\n9\n" + section},
+      {"warm.inp", nodes + "*MATERIAL,NAME=M\n*ELASTIC\n7e10,.3,0\n6e10,.3,100\n*DENSITY\n2700\n" + section},
+      {"undefined.inp", nodes + section},
+      {"none.inp", nodes},
+      {"without_section.inp", nodes + "*MATERIAL,NAME=M\n*ELASTIC\n7e10,.3\n"}};
+  ReadOptions options;
+  options.material = Material{67e9, 0.33, 2840};
+  for (const auto& [name, text] : files) {
+    write_file(folder.path / name, text);
+    const MeshFile file = read_mesh(folder.path / name, options);
+    ASSERT_EQ(file.mesh.solid_properties.size(), 1u) << name;
+    const Material& m = file.mesh.solid_properties[0].material;
+    EXPECT_EQ(std::tie(m.E, m.nu, m.rho), std::tie(options.material->E, options.material->nu, options.material->rho))
+        << name;
+    for (const std::string& note : file.notes) EXPECT_EQ(note.find("material"), std::string::npos) << name << note;
+    EXPECT_NO_THROW(file.mesh.validate()) << name;
   }
 }
 

@@ -94,9 +94,9 @@ inline void add_random_stiffening(ReducedBody& body, unsigned seed) {
 
 /// A folder of its own for each test.
 inline std::filesystem::path test_folder() {
-  const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+  const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
   const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) / (std::string(info->test_suite_name()) + "." + info->name());
+      std::filesystem::path(::testing::TempDir()) / (std::string(info->test_suite_name()) + "." + info->name());
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;
