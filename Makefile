@@ -11,7 +11,7 @@ packages := g++ cmake ninja-build \
   libgtest-dev libbenchmark-dev \
   python3 python3-numpy python3-scipy python3-meshio python3-vtk9 python3-h5py
 format tidy: packages += clang-format clang-tidy
-fuzz: packages += clang libclang-rt-14-dev
+asan build-asan fuzz: packages += clang libclang-rt-14-dev
 
 sources = $(wildcard $(foreach folder,fem reduction dynamics apps tests tests/* tests/install/*,$(folder)/*.hpp $(folder)/*.cpp))
 

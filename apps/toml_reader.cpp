@@ -45,7 +45,7 @@ Value convert_array(const toml::array& array, const Place& place) {
 Value convert_table(const toml::table& table, const Place& place) {
   Value value;
   for (auto&& [key, item] : table) {
-    value.entries.emplace_back(std::string(key.str()), convert(item, place_at(place.file, key.source().begin)));
+    value.entries.push_back({std::string(key.str()), convert(item, place_at(place.file, key.source().begin))});
   }
   std::stable_sort(value.entries.begin(), value.entries.end(), [](const auto& a, const auto& b) {
     return std::pair(a.second.place.line, a.second.place.column) <

@@ -13,18 +13,19 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// What a start says of the energies to come: its own; where nothing moves or pushes yet but round-off, that of slow
-/// bodies. `time`: in which a push shows [s].
+/// What a start says of the energies to come: its own; where it has none, what its pushes begin with; where nothing
+/// pushes yet but round-off, that of slow bodies. `time`: in which a push shows [s].
 double energy_scale(const Equations& equations, double at_start, const VectorXd& y_dot, double time) {
   const double slow = slow_energy(equations.scene());
-  double begun = at_start;
+  if (at_start > nothing * slow) return at_start;
+  double begun = 0;
   for (size_t i = 0; i < equations.places().size(); ++i) {
     const BodyPlaces& at = equations.places()[i];
     const ReducedBody& b = equations.scene().bodies[i];
     begun += (b.m * y_dot.segment<3>(at.v).squaredNorm() + b.J0.trace() / 3 * y_dot.segment<3>(at.w).squaredNorm()) *
              time * time / 2;
   }
-  return begun > nothing * slow ? std::max(at_start, 1e-30) : slow;
+  return begun > nothing * slow ? begun : slow;
 }
 
 }  // namespace

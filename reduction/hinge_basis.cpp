@@ -75,17 +75,23 @@ MatrixXd elastic_parts(const EigenPairs& pairs, const VectorXd& border, int rigi
   return found;
 }
 
-/// The first `modes` that turn the root, fewer where the mesh has no more.
+/// The first `modes` that turn the root, fewer where the mesh has no more, or none that round-off leaves.
 MatrixXd sprung_shapes(const SprungBody& body, double stiffness, int modes, EigenOptions options) {
   const SparseMatrix K = bordered(body.K, VectorXd::Zero(body.K.cols()), stiffness / body.J);
+  const int rigid = stiffness == 0 ? 1 : 0;  // the free rotation bends nothing
+  const auto most = static_cast<int>(K.cols());
   options.whole_groups = true;
-  for (options.num_modes = 3 * modes + 2;; options.num_modes *= 2) {  // out of plane, and a rigid one, beside each
-    options.num_modes = std::min(options.num_modes, static_cast<int>(K.cols()));
-    const EigenPairs pairs = solve_modes({K, body.M, stiffness == 0}, options);
-    const int rigid = stiffness == 0 ? 1 : 0;  // the free rotation bends nothing
-    MatrixXd shapes = elastic_parts(pairs, body.border, rigid, modes);
-    if (shapes.cols() == modes || options.num_modes == K.cols()) return shapes;
+  options.num_modes = std::min(3 * modes + 2, most);  // out of plane, and a rigid one, beside each
+  MatrixXd shapes = elastic_parts(solve_modes({K, body.M, stiffness == 0}, options), body.border, rigid, modes);
+  while (shapes.cols() < modes && options.num_modes < most) {
+    options.num_modes = std::min(2 * options.num_modes, most);
+    try {
+      shapes = elastic_parts(solve_modes({K, body.M, stiffness == 0}, options), body.border, rigid, modes);
+    } catch (const NumericalError&) {
+      break;  // so far beyond the lowest that they cannot be verified
+    }
   }
+  return shapes;
 }
 
 /// M-orthonormal shapes: `modes` for each spring. Shapes of neighbouring springs are nearly parallel. Where one adds

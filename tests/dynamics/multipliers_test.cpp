@@ -81,6 +81,26 @@ TEST(Multipliers, PendulumHasItsTextbookForcesAndPeriod) {
   EXPECT_LT(r.summary.energy_balance, 1e-9);
 }
 
+// At the start nothing moves, and nothing has energy yet.
+TEST(Multipliers, AConstantTorqueFromRestTurnsABodyEvenly) {
+  const double m = 2, l = 0.8, torque = 0.3, J = m * l * l / 3;
+  Multibody scene;
+  scene.bodies = {testing::bar("bar", m, l)};
+  scene.joints = {joint("pivot", JointKind::hinge, at(-1), at(0))};
+  Load motor;
+  motor.name = "motor", motor.at = at(0);
+  motor.torque[2] = [torque](double) { return torque; };
+  scene.loads.push_back(motor);
+  const MultibodyTrajectory r =
+      integrate_multipliers(Multipliers(scene), place_bodies(scene, {}), testing::options(1e-9, 1, 0.1));
+  for (size_t i = 0; i < r.time.size(); ++i) {
+    const double angle = 0.5 * torque / J * r.time[i] * r.time[i];
+    EXPECT_NEAR(r.states[i].coordinate[0], angle, 1e-9) << r.time[i];
+    EXPECT_NEAR(r.states[i].work, torque * angle, 1e-9) << r.time[i];
+  }
+  EXPECT_LT(r.summary.energy_balance, 1e-9);
+}
+
 /// Planar chain of bars in absolute angles: sum_j H_ij (theta_j'' cos + theta_j'^2 sin)(theta_i - theta_j) = -w_i cos
 /// theta_i, flown by the classical Runge-Kutta method.
 VectorXd chain_acceleration(const VectorXd& angle, const VectorXd& rate, double m, double l, double g) {

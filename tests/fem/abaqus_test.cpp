@@ -156,7 +156,9 @@ TEST(Abaqus, PreloadOnlyCountsWhereItStiffens) {
   };
   EXPECT_EQ(read(deck("", "")).modes, 5);
   for (const auto& [load, modes] : {std::pair("", ", PERTURBATION"), std::pair(", NLGEOM", "")})
-    EXPECT_NE(input_error([&] { read(deck(load, modes)); }).find("starts from the loads of this step"),
+    EXPECT_NE(input_error([&, load = load, modes = modes] {
+                read(deck(load, modes));
+              }).find("starts from the loads of this step"),
               std::string::npos);
 }
 

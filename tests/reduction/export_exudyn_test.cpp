@@ -199,7 +199,7 @@ TEST(Exudyn, BadFilesAreRefused) {
   const std::filesystem::path path = folder.path / "boom.hdf5";
   EXPECT_NE(message([&] { read_exudyn(path); }).find("No such file"), std::string::npos);
   std::ofstream(path) << "not HDF5";
-  EXPECT_NE(message([&] { read_exudyn(path); }).find("no HDF5 file"), std::string::npos);
+  EXPECT_NE(message([&] { read_exudyn(path); }).find("not an HDF5 file"), std::string::npos);
   write_exudyn(clamped_sample(2).body, {}, path);
   const ExudynDictionary good = read_exudyn_dictionary(path);
   const auto fault = [&](const std::function<void(ExudynDictionary&)>& change) {
