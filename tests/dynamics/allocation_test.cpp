@@ -6,7 +6,14 @@
 #include <cstdlib>
 
 // Counts every allocation of this program by standing in front of glibc's malloc; sanitizers have their own malloc.
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__SANITIZE_ADDRESS__)
+#define FLEXBOOM_HAS_SANITIZERS 1
+#elif defined(__has_feature)
+#define FLEXBOOM_HAS_SANITIZERS __has_feature(address_sanitizer)
+#else
+#define FLEXBOOM_HAS_SANITIZERS 0
+#endif
+#if defined(__GLIBC__) && !FLEXBOOM_HAS_SANITIZERS
 
 namespace {
 std::atomic<long> allocations{0};
