@@ -64,10 +64,9 @@ void set_energies(MultipliersOptions& o, const TreeLayout& l, const VectorXd& y0
 }
 
 /// Joints number from `first`.
-std::vector<Event> events_of(const std::vector<StopEvent>& crossings, int first) {
-  std::vector<Event> events;
-  for (const StopEvent& e : crossings) events.push_back({e.time, e.joint - first, e.contact, e.rate});
-  return events;
+std::vector<StopEvent> events_of(std::vector<StopEvent> crossings, int first) {
+  for (StopEvent& e : crossings) e.joint -= first;
+  return crossings;
 }
 
 Scene without_loops(Scene scene) {

@@ -61,9 +61,9 @@ std::string event_rows(const RunResult& r, size_t first) {
   const std::vector<std::string> hinges = hinge_names(r);
   std::string out;
   for (size_t i = first; i < r.trajectory.events.size(); ++i) {
-    const Event& e = r.trajectory.events[i];
+    const StopEvent& e = r.trajectory.events[i];
     out +=
-        fmt::format("{:.17g},{},{}\n", e.time, hinges[static_cast<size_t>(e.hinge)], e.contact ? "contact" : "release");
+        fmt::format("{:.17g},{},{}\n", e.time, hinges[static_cast<size_t>(e.joint)], e.contact ? "contact" : "release");
   }
   return out;
 }

@@ -161,7 +161,7 @@ void ResultsFolder::write_rows(std::ostream& out, const OutputTable& table, size
 void ResultsFolder::add(const RunResult& r, size_t first) {
   if (!begun_) begin(r);
   const fs::path rows = path_ / "trajectory.csv", events = path_ / "events.csv";
-  const std::vector<Event>& all = r.trajectory.events;
+  const std::vector<StopEvent>& all = r.trajectory.events;
   if (first == 0) {
     write_file(rows, [&](std::ostream& out) {
       copy_head(rows, rows_before_, out);

@@ -85,7 +85,7 @@ void check_integrator(Faults& faults, const Scene& scene) {
   if (redundant) check_multipliers(scene, faults);
   if (!(std::isfinite(scene.settle) && scene.settle < 1)) {
     faults.add("integrator.settle",
-               fmt::format("is {}; it must be below 1 (0: never, negative: tolerance / 100)", scene.settle));
+               fmt::format("is {}; it must be below 1 (0: never, negative: the tolerance)", scene.settle));
   }
 }
 

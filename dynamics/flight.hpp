@@ -40,7 +40,7 @@ struct FlightOptions {
   double duration = 10;       // [s], the time at the end
   double output_step = 0.01;  // [s]
   /// A hinge whose rate at the stop falls below this fraction of its largest rate so far has settled: its crossings are
-  /// no longer located (its stop counts as open) until the rate doubles. Negative: tolerance / 100. Zero: never.
+  /// no longer located (its stop counts as open) until the rate doubles. Negative: the tolerance. Zero: never.
   double settle = -1;
   /// Per hinge of a System, per joint of other scenes: of a flight that this one goes on. Empty: none was met.
   std::vector<StopHistory> stops{};

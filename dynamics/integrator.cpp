@@ -3,10 +3,10 @@
 #include "dynamics/arkode.hpp"
 #include "dynamics/conservation.hpp"
 #include "dynamics/cvode.hpp"
+#include "dynamics/event_loop.hpp"
 #include "dynamics/exponential.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
-#include "fem/stopwatch.hpp"
 
 #include <fmt/format.h>
 
@@ -166,123 +166,78 @@ class Scales {
   ErrorScale error_;
 };
 
-/// Which stops are closed, which crossings are looked for.
-struct Contacts {
-  std::vector<char> closed, armed;
-  std::vector<StopHistory> history;
-};
-
-/// Stops at the start: closed beyond the threshold; exactly on it, by where the hinge is going, and at rest there by
-/// where it is pushed. Those that had settled are as good as open.
-Contacts contacts_at_start(const System& system, const VectorXd& y, const IntegratorOptions& options) {
-  const size_t n = system.appendages().size();
-  Contacts c{std::vector<char>(n, 0), std::vector<char>(n, 0), stops_at_start(options, n)};
-  VectorXd y_dot(y.size());
-  system.derivative(options.start, y.data(), c.closed, *system.workspace(), y_dot.data());
-  for (size_t i = 0; i < n; ++i) {
-    const int hinge = static_cast<int>(i);
-    const double gap = system.gap(y.data(), hinge), rate = system.gap_rate(y.data(), hinge);
-    const double push = system.gap_rate(y_dot.data(), hinge);
-    c.armed[i] = system.appendages()[i].hinge.mechanism.stop_stiffness > 0 && c.history[i].settled < 0;
-    c.closed[i] =
-        c.armed[i] && c.history[i].closed.value_or(gap > 0 || (gap == 0 && (rate > 0 || (rate == 0 && push > 0))));
+/// The stops of the booms: their hinges have the places of the bodies' frames.
+std::vector<Stop> stops_of(const System& system) {
+  std::vector<Stop> stops;
+  for (const Appendage& a : system.appendages()) {
+    Joint joint;
+    joint.name = a.body.name, joint.mechanism = a.hinge.mechanism;
+    stops.push_back(stop_of(joint, stops.size(), a.body));
   }
-  return c;
+  return stops;
 }
 
-/// One run: the event loop around a method.
-class Flight {
+class SystemFlight final : public Flight<Trajectory> {
  public:
-  Flight(const System& system, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method,
-         const Checkpoint<Trajectory>& so_far)
-      : system_(system),
-        options_(options),
-        so_far_(so_far),
-        clock_(options),
-        settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
+  SystemFlight(const System& system, const VectorXd& y0, const IntegratorOptions& options,
+               const IntegratorMethod& method, const Checkpoint<Trajectory>& so_far)
+      : Flight(options, so_far, stops_of(system), system.appendages().size()),
+        system_(system),
+        method_(method),
         scales_(system, y0, method.local_share * options.tolerance, options.rescale_at_events),
         stepper_(method.make_of_system ? method.make_of_system(system, scales_.error())
                                        : method.make(ode_of(system), scales_.error())),
-        contacts_(contacts_at_start(system, y0, options)),
-        outputs_(options),
-        t_(options.start),
-        y_(y0),
-        next_y_(y0),
         y_dot_(y0.size()),
         samples_(y0.size(), 16),
-        work_(system.workspace()),
-        crossed_(contacts_.closed.size(), 0),
-        approach_(crossed_.size()),
-        asleep_(crossed_.size(), 0.0) {
-    for (size_t i = 0; i < crossed_.size(); ++i) {
-      const int hinge = static_cast<int>(i);
-      approach_[i].observe(system.gap(y0.data(), hinge), system.gap_rate(y0.data(), hinge), spring_rate(i));
-    }
+        work_(system.workspace()) {
+    y_ = y0;
+    contacts_.begin(*this);
     if (options.rescale_at_events) return;
-    for (size_t i = 0; i < crossed_.size(); ++i)
-      scales_.raise_gap(static_cast<int>(i), contacts_.history[i].largest_gap);
-  }
-
-  Trajectory fly() {
-    record(t_, y_);
-    checkpoint();
-    try {
-      stepper_->restart(t_, y_, contacts_.closed, contacts_.armed);
-      stepper_->foresee(options_.duration, [this](const VectorXd& y) { scales_.foresee(y); });
-      while (t_ < options_.duration && !stopped()) {
-        advance();
-        if (clock_.due() && t_ < options_.duration) checkpoint();
-      }
-    } catch (const NumericalError&) {
-      checkpoint();
-      throw;
-    }
-    finish();
-    return std::move(result_);
+    for (size_t i = 0; i < contacts_.size(); ++i) scales_.raise_gap(static_cast<int>(i), contacts_.largest_gap(i));
   }
 
  private:
-  bool stopped() {
-    const bool stop = options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed);
-    result_.summary.interrupted = result_.summary.interrupted || stop;
-    return stop;
+  Gap gap(size_t stop) override {
+    const int hinge = static_cast<int>(stop);
+    return {system_.gap(y_.data(), hinge), system_.gap_rate(y_.data(), hinge)};
   }
 
-  /// What an interruption here would leave.
-  void checkpoint() {
-    if (so_far_) {
-      const size_t outputs = result_.time.size();
-      const IntegrationSummary before = result_.summary;
-      result_.summary.interrupted = true;
-      finish();
-      so_far_(result_, outputs);
-      result_.summary = before;
-      result_.time.resize(outputs), result_.y.resize(outputs), result_.balance.resize(outputs);
-    }
-    clock_.restart();
+  /// Stiff modes make a push of what the method's error leaves open of them.
+  Push push(size_t stop, std::span<const char> closed) override {
+    const ErrorScale& error = scales_.error();
+    const double here = acceleration(stop, closed, y_);
+    return {here, std::abs(acceleration(stop, closed, y_ + error.tolerance * error.scale) - here)};
   }
 
-  void advance() {
-    double next_t = t_;
-    next_y_ = y_;
-    stepper_->step(options_.duration, next_t, next_y_, crossed_);
-    if (++steps_ > options_.max_steps)
-      throw NumericalError(
-          fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, next_t, options_.duration));
-    if (!next_y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", next_t));
-    t_ = next_t, y_.swap(next_y_);
-    write_outputs();
-    scales_.observe(y_);
-    if (switch_contacts()) {
+  double acceleration(size_t stop, std::span<const char> closed, const VectorXd& y) {
+    system_.derivative(t_, y.data(), closed, *work_, y_dot_.data());
+    return system_.gap_rate(y_dot_.data(), static_cast<int>(stop));
+  }
+
+  /// The exponential method has no error in what a hinge does when it hardly moves.
+  double noise(size_t stop) const override {
+    const ErrorScale& error = scales_.error();
+    if (method_.make_of_system != nullptr) return 1e-14 * contacts_.largest_gap(stop);
+    return noise_of_methods * error.tolerance * error.scale[system_.layout().body[stop]];
+  }
+
+  void put_on_stop(size_t stop) override { y_[system_.layout().body[stop]] = 0; }
+
+  void restart() override {
+    if (t_ > options_.start) {
       if (!system_.fixed_hub()) y_.segment<4>(system_.layout().attitude()).normalize();
       scales_.restart(y_);
-      stepper_->restart(t_, y_, contacts_.closed, contacts_.armed);
-      ++result_.summary.restarts;
     }
-    if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
+    stepper_->restart(t_, y_, contacts_.closed(), contacts_.armed());
+    if (t_ == options_.start) stepper_->foresee(options_.duration, [this](const VectorXd& y) { scales_.foresee(y); });
   }
 
-  void write_outputs() {
+  void step(double limit, double& t, VectorXd& y) override { stepper_->step(limit, t, y, contacts_.crossed()); }
+  void interpolate(double t, VectorXd& y) override { stepper_->interpolate(t, y); }
+  void observe(const VectorXd& y) override { scales_.observe(y); }
+  void keep_rows(size_t rows) override { result_.y.resize(rows), result_.balance.resize(rows); }
+
+  void write_outputs() override {
     for (outputs_within_step(); !times_.empty() && !stopped(); outputs_within_step()) {
       stepper_->interpolate_all(times_, samples_);
       for (size_t i = 0; i < times_.size(); ++i) {
@@ -290,7 +245,7 @@ class Flight {
         record(times_[i], samples_.col(static_cast<Eigen::Index>(i)));
       }
     }
-    if (outputs_.after(result_.time.size()) == t_ && !stopped()) record(t_, y_);
+    if (output_time() == t_ && !stopped()) record(t_, y_);
   }
 
   /// The next ones before its end, as many as go at once.
@@ -303,130 +258,29 @@ class Flight {
     }
   }
 
-  void record(double t, const Eigen::Ref<const VectorXd>& y) {
+  void record(double t, VectorXd y) override {
     result_.time.push_back(t);
-    result_.y.emplace_back(y);
     if (!system_.fixed_hub()) {
-      auto attitude = result_.y.back().segment<4>(system_.layout().attitude());
+      auto attitude = y.segment<4>(system_.layout().attitude());
       double& drift = result_.summary.constraint_drift;
       drift = std::max(drift, std::abs(attitude.norm() - 1));
       attitude.normalize();
     }
-    result_.balance.push_back(system_.balance(result_.y.back(), *work_));
+    result_.balance.push_back(system_.balance(y, *work_));
+    result_.y.push_back(std::move(y));
   }
 
-  /// Applies crossings and settling. True when something changed and the method must start again.
-  bool switch_contacts() {
-    bool changed = false;
-    for (size_t i = 0; i < crossed_.size(); ++i) {
-      const int hinge = static_cast<int>(i);
-      const double rate = system_.gap_rate(y_.data(), hinge);
-      double &largest = contacts_.history[i].largest_rate, &reach = contacts_.history[i].largest_gap;
-      largest = std::max(largest, std::abs(rate));
-      reach = std::max(reach, std::abs(system_.gap(y_.data(), hinge)));
-      const bool slipped = slipped_through(i);
-      if ((crossed_[i] != 0 || slipped) && has_decayed(i, rate)) {
-        settle(i);
-        changed = true;
-      } else if (crossed_[i] != 0 || slipped) {
-        double& gap = y_[system_.layout().body[i]];
-        const bool contact = slipped ? gap > 0 : crossed_[i] > 0;
-        if (!slipped) gap = 0;  // on the stop, exactly: the root is good to round-off of t
-        contacts_.closed[i] = contact;
-        result_.events.push_back({t_, hinge, contact, rate});
-        chatter_.contact(t_, system_.appendages()[i].body.name);
-        changed = true;
-        approach_[i].restart(rate);
-        if (std::abs(rate) < settle_ * largest && !pushed(i, settle_ * largest)) settle(i);
-      } else if (contacts_.history[i].settled >= 0 && std::abs(rate) > 2 * std::max(settle_ * largest, asleep_[i])) {
-        wake(i);
-        changed = true;
-      }
-      approach_[i].observe(system_.gap(y_.data(), hinge), rate, spring_rate(i));
-    }
-    return changed;
-  }
-
-  /// Is a crossing at this rate but the end of a motion that has died out on its way to the stop?
-  bool has_decayed(size_t i, double rate) {
-    if (!approach_[i].has_decayed(rate)) return false;
-    const ErrorScale& error = scales_.error();
-    const Layout& l = system_.layout();
-    const double noise = 10 * error.tolerance * error.scale[l.p + l.base + l.body[i]];  // errors of steps add up
-    asleep_[i] = std::max({settle_ * contacts_.history[i].largest_rate, approach_[i].round_off(), noise});
-    if (!(std::abs(rate) < asleep_[i])) return false;
-    // Stiff modes make a push of what the method's error leaves open of them.
-    const double here = push(i, y_), beside = push(i, y_ + error.tolerance * error.scale);
-    return std::abs(here) <= 2 * asleep_[i] + std::abs(beside - here);
-  }
-
-  /// Of a rigid boom off its stop [rad/s].
-  double spring_rate(size_t i) const {
-    const Appendage& a = system_.appendages()[i];
-    return std::sqrt(a.hinge.mechanism.stiffness / a.body.J0(2, 2));
-  }
-
-  /// Is the gap on the wrong side of the flag, with no crossing found? A root finder sees no sign change where the gap
-  /// starts at zero and stays there for a while.
-  bool slipped_through(size_t i) const {
-    if (!contacts_.armed[i] || crossed_[i] != 0) return false;
-    const double gap = system_.gap(y_.data(), static_cast<int>(i));
-    const double noise = scales_.error().tolerance * scales_.error().scale[system_.layout().body[i]];
-    return contacts_.closed[i] ? gap < -noise : gap > noise;
-  }
-
-  /// Does something push a hinge that is on its stop, so that it will not stay there? A boom that is pressed against
-  /// its stop swings in it, and comes back to where the stop begins with no rate left.
-  bool pushed(size_t i, double least_rate) { return std::abs(push(i, y_)) > 2 * least_rate; }
-
-  /// What pushes a hinge, as the rate that it gives within its period on the stop.
-  double push(size_t i, const VectorXd& y) {
-    system_.derivative(t_, y.data(), contacts_.closed, *work_, y_dot_.data());
-    const Appendage& a = system_.appendages()[i];
-    const double period = std::sqrt(a.body.J0(2, 2) / (a.hinge.mechanism.stiffness + a.hinge.mechanism.stop_stiffness));
-    return period * system_.gap_rate(y_dot_.data(), static_cast<int>(i));
-  }
-
-  void settle(size_t i) {
-    contacts_.history[i].settled = t_;
-    contacts_.armed[i] = 0;
-    contacts_.closed[i] = 0;
-  }
-
-  void wake(size_t i) {
-    contacts_.history[i].settled = -1;
-    asleep_[i] = 0;
-    contacts_.armed[i] = 1;
-    contacts_.closed[i] = system_.gap(y_.data(), static_cast<int>(i)) > 0;
-  }
-
-  void finish() {
+  void finish() override {
     IntegrationSummary& s = result_.summary;
-    const StepCounts c = stepper_->counts();
-    s.method = options_.method;
-    s.steps = c.steps;
-    s.rhs_evaluations = c.rhs_evaluations;
-    s.jacobian_evaluations = c.jacobian_evaluations;
-    s.factorisations = c.factorisations;
-    s.newton_iterations = c.newton_iterations;
-    s.error_test_failures = c.error_test_failures;
-    s.seconds = watch_.seconds();
-    s.stops = contacts_.history;
-    for (size_t i = 0; i < s.stops.size(); ++i) s.stops[i].closed = contacts_.closed[i] != 0;
-    if (s.interrupted && result_.time.back() < t_) record(t_, y_);
-    conservation(s);
-  }
-
-  double dissipated(size_t output) const { return result_.y[output][system_.layout().dissipated()]; }
-
-  /// Energy and momentum balances over the outputs.
-  void conservation(IntegrationSummary& s) const {
+    s.method = method_.name;
+    add_counts(stepper_->counts(), s);
     double mass = system_.hub().m, inertia = system_.hub().J0.trace();
     for (const Appendage& a : system_.appendages()) mass += a.body.m, inertia += a.body.J0.trace();
     Conservation kept(mass, inertia, options_.largest);
     for (size_t i = 0; i < result_.time.size(); ++i) {
       const Balance& b = result_.balance[i];
-      kept.add(b.kinetic + b.elastic + dissipated(i), std::abs(b.kinetic) + std::abs(b.elastic), b);
+      kept.add(b.kinetic + b.elastic + result_.y[i][system_.layout().dissipated()],
+               std::abs(b.kinetic) + std::abs(b.elastic), b);
     }
     s.largest = kept.largest();
     s.energy_balance = kept.energy_balance();
@@ -434,29 +288,25 @@ class Flight {
   }
 
   const System& system_;
-  const IntegratorOptions& options_;
-  const Checkpoint<Trajectory>& so_far_;
-  CheckpointClock clock_;
-  Stopwatch watch_;
-  double settle_;
+  const IntegratorMethod& method_;
   Scales scales_;
   std::unique_ptr<Stepper> stepper_;
-  Contacts contacts_;
-  OutputTimes outputs_;
-  double t_;
-  VectorXd y_, next_y_, y_dot_;
+  VectorXd y_dot_;
   std::vector<double> times_;  // of outputs within a step, and their states
   Eigen::MatrixXd samples_;
   WorkspaceHandle work_;
-  std::vector<int> crossed_;
-  std::vector<Approach> approach_;
-  ChatterGuard chatter_;
-  std::vector<double> asleep_;  // rates below this do not wake a hinge that has settled on its way [rad/s]
-  long steps_ = 0;
-  Trajectory result_;
 };
 
 }  // namespace
+
+void add_counts(const StepCounts& c, IntegrationSummary& s) {
+  s.steps = c.steps;
+  s.rhs_evaluations = c.rhs_evaluations;
+  s.jacobian_evaluations = c.jacobian_evaluations;
+  s.factorisations = c.factorisations;
+  s.newton_iterations = c.newton_iterations;
+  s.error_test_failures = c.error_test_failures;
+}
 
 void Stepper::interpolate_all(std::span<const double> times, Eigen::MatrixXd& Y) {
   VectorXd y(Y.rows());
@@ -484,7 +334,7 @@ Trajectory integrate(const System& system, const VectorXd& y0, const IntegratorO
   check_options(options, system.appendages().size());
   require(y0.size() == system.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   if (system.field()) system.field()->orbit.at(options.duration);  // does it last so long?
-  return Flight(system, y0, options, integrator_method(options.method, MethodFor::system), so_far).fly();
+  return SystemFlight(system, y0, options, integrator_method(options.method, MethodFor::system), so_far).fly();
 }
 
 }  // namespace flexboom

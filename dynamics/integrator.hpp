@@ -1,6 +1,6 @@
 #pragma once
 
-#include "dynamics/flight.hpp"
+#include "dynamics/contacts.hpp"
 #include "dynamics/system.hpp"
 
 #include <Eigen/Core>
@@ -21,14 +21,6 @@ struct IntegratorOptions : FlightOptions {
   /// Measure the hinge's error against its motion since the last event instead of its largest motion: late, tiny
   /// contacts keep their relative accuracy. Costs steps. Of a System.
   bool rescale_at_events = false;
-};
-
-/// A crossing of a stop.
-struct Event {
-  double time = 0;      // [s]
-  int hinge = 0;        // index of the appendage
-  bool contact = true;  // true: touches the stop, false: leaves it
-  double rate = 0;      // hinge rate there [rad/s]
 };
 
 /// What an integration did, and how well it kept what must be kept.
@@ -54,7 +46,7 @@ struct Trajectory {
   std::vector<double> time;
   std::vector<Eigen::VectorXd> y;  // System::layout()
   std::vector<Balance> balance;
-  std::vector<Event> events;
+  std::vector<StopEvent> events;
   IntegrationSummary summary;
 };
 
@@ -74,6 +66,11 @@ struct StepCounts {
   long steps = 0, rhs_evaluations = 0, jacobian_evaluations = 0, factorisations = 0, newton_iterations = 0,
        error_test_failures = 0;
 };
+
+void add_counts(const StepCounts&, IntegrationSummary&);
+
+/// What errors of steps add up to in a gap, in units of the error that a step is allowed.
+inline constexpr double noise_of_methods = 10;
 
 /// One integration method on one system. Each step is smooth: the contact flags are constant between restarts.
 class Stepper {

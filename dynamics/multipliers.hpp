@@ -1,6 +1,6 @@
 #pragma once
 
-#include "dynamics/flight.hpp"
+#include "dynamics/contacts.hpp"
 #include "dynamics/multibody.hpp"
 #include "dynamics/system.hpp"
 
@@ -51,14 +51,6 @@ struct MultipliersOptions : FlightOptions {
   std::vector<double> angles{};       // per joint: a hinge starts at the turn nearest to this [rad]; empty: to its rest
   double dissipated = 0, work = 0;    // before the start [J]
   std::string linear_solver = "klu";  // or "dense"
-};
-
-/// A crossing of the stop of a joint.
-struct StopEvent {
-  double time = 0;      // [s]
-  int joint = 0;        // index into Multibody::joints
-  bool contact = true;  // true: touches the stop, false: leaves it
-  double rate = 0;      // [rad/s] or [m/s]
 };
 
 struct MultipliersSummary {

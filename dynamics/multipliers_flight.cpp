@@ -1,4 +1,5 @@
 #include "dynamics/crossing.hpp"
+#include "dynamics/event_loop.hpp"
 #include "dynamics/ida.hpp"
 #include "dynamics/multipliers.hpp"
 #include "dynamics/multipliers_balance.hpp"
@@ -6,7 +7,6 @@
 #include "dynamics/multipliers_scales.hpp"
 #include "dynamics/multipliers_start.hpp"
 #include "fem/check.hpp"
-#include "fem/stopwatch.hpp"
 
 #include <fmt/format.h>
 
@@ -25,26 +25,28 @@ constexpr double local_share = 0.015;
 /// A violation of a joint at the start beyond this [m, rad, their rates] is the caller's mistake.
 constexpr double open_joint = 1e-8;
 
-/// One run: the events around IDA.
-class MultipliersFlight final : public DaeProblem {
+std::vector<Stop> stops_of(const Equations& equations) {
+  const Multibody& scene = equations.scene();
+  std::vector<Stop> stops;
+  for (size_t i = 0; i < scene.joints.size(); ++i) {
+    const Joint& joint = scene.joints[i];
+    if (equations.joints()[i].stop)
+      stops.push_back(stop_of(joint, i, scene.bodies[static_cast<size_t>(std::max(joint.b.body, 0))]));
+  }
+  return stops;
+}
+
+/// Steps, rows and stops of one run by IDA.
+class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaeProblem {
  public:
-  MultipliersFlight(const Multipliers& system, const std::vector<BodyState>& start, const MultipliersOptions& options,
-                    const Checkpoint<MultibodyTrajectory>& so_far)
-      : equations_(system.impl()),
+  MultipliersFlight(const Multipliers& system, Equations& equations, const std::vector<BodyState>& start,
+                    const MultipliersOptions& options, const Checkpoint<MultibodyTrajectory>& so_far)
+      : Flight(options, so_far, stops_of(equations), system.multibody().joints.size()),
+        equations_(equations),
         scene_(system.multibody()),
-        options_(options),
-        so_far_(so_far),
-        clock_(options),
-        outputs_(options),
-        settle_(options.settle < 0 ? options.tolerance / 100 : options.settle),
-        t_(options.start),
-        history_(stops_at_start(options, scene_.joints.size())) {
+        options_(options) {
     const size_t joints = scene_.joints.size();
     memory_ = {std::vector<char>(joints, 0), std::vector<double>(joints, 0.0)};
-    for (size_t i = 0; i < joints; ++i)
-      if (equations_.joints()[i].stop) stops_.push_back(i);
-    for (const size_t joint : stops_) armed_.push_back(history_[joint].settled < 0);
-    crossed_.assign(stops_.size(), 0), approach_.resize(stops_.size()), asleep_.assign(stops_.size(), 0.0);
     check_sizes(start);
     frame_ = std::make_unique<FlightFrame>(equations_, start, t_);
     start_on_constraints(frame_->seen(start));
@@ -58,23 +60,7 @@ class MultipliersFlight final : public DaeProblem {
     ida_ = std::make_unique<Ida>(*this, options.linear_solver);
   }
 
-  MultibodyTrajectory fly() {
-    record(t_, y_);
-    checkpoint();
-    try {
-      ida_->restart(t_, y_, y_dot_);
-      while (t_ < options_.duration && !stopped()) {
-        advance();
-        if (clock_.due() && t_ < options_.duration) checkpoint();
-      }
-    } catch (const NumericalError&) {
-      checkpoint();
-      throw;
-    }
-    finish();
-    return std::move(result_);
-  }
-
+ private:
   int size() const override { return equations_.size(); }
   VectorXd differential() const override {
     VectorXd id = VectorXd::Zero(size());
@@ -92,20 +78,46 @@ class MultipliersFlight final : public DaeProblem {
   std::span<const int> column_starts() const override { return assembly_.starts(); }
   std::span<const int> rows() const override { return assembly_.rows(); }
   void weights(double* w) const override { scales_->weights(w); }
-  int roots() const override { return static_cast<int>(stops_.size()); }
+  int roots() const override { return static_cast<int>(contacts_.size()); }
   void root_values(double, const double* y, double* values) override {
     // Round-off of a gap must not look like a crossing: it counts as on the side of the flag.
     constexpr double round_off = 2e-16;
-    for (size_t i = 0; i < stops_.size(); ++i) {
+    for (size_t i = 0; i < contacts_.size(); ++i) {
       const double g = gap(i, y).value;
-      const double side = memory_.closed[stops_[i]] ? round_off : -round_off;
-      values[i] = !armed_[i] ? 1.0 : std::abs(g) <= round_off ? side : g;
+      const double side = contacts_.closed()[i] ? round_off : -round_off;
+      values[i] = !contacts_.armed()[i] ? 1.0 : std::abs(g) <= round_off ? side : g;
     }
   }
 
- private:
   DriveMotion<double> gap(size_t stop, const double* y) {
-    return equations_.gap(stops_[stop], y, memory_.near[stops_[stop]]);
+    const size_t joint = contacts_.stop(stop).joint;
+    return equations_.gap(joint, y, memory_.near[joint]);
+  }
+  Gap gap(size_t stop) override {
+    const DriveMotion<double> g = gap(stop, y_.data());
+    return {g.value, g.rate};
+  }
+
+  /// By the change of the rate over a short time.
+  Push push(size_t stop, std::span<const char> closed) override {
+    constexpr double h = 1e-7;
+    VectorXd y = y_;
+    JointMemory memory = memory_;
+    set_closed(closed, memory);
+    VectorXd y_dot;
+    equations_.make_consistent(t_, y, y_dot, memory);
+    const double before = gap(stop, (y - h * y_dot).eval().data()).rate,
+                 after = gap(stop, (y + h * y_dot).eval().data()).rate;
+    return {(after - before) / (2 * h), 0};
+  }
+
+  double noise(size_t stop) const override {
+    constexpr double of_steps = 3, round_off = 1e-14;
+    return std::max(round_off, of_steps * local_share * options_.tolerance * contacts_.largest_gap(stop));
+  }
+
+  void set_closed(std::span<const char> closed, JointMemory& memory) const {
+    for (size_t i = 0; i < contacts_.size(); ++i) memory.closed[contacts_.stop(i).joint] = closed[i];
   }
 
   void check_sizes(const std::vector<BodyState>& start) const {
@@ -146,7 +158,7 @@ class MultipliersFlight final : public DaeProblem {
                                  place ? v.position : v.angle, place ? metres : radians));
   }
 
-  /// Angles near what was asked for, stops closed beyond their threshold; on it by where the joint goes.
+  /// Angles near what was asked for.
   void begin_contacts() {
     for (size_t i = 0; i < scene_.joints.size(); ++i) {
       const HingeMechanism& m = scene_.joints[i].mechanism;
@@ -154,24 +166,8 @@ class MultipliersFlight final : public DaeProblem {
       memory_.near[i] = angle - m.threshold;
     }
     follow_turns();
-    VectorXd y = y_;
-    equations_.make_consistent(t_, y, y_dot_, memory_);
-    for (size_t i = 0; i < stops_.size(); ++i) {
-      const DriveMotion<double> g = gap(i, y_.data());
-      const double push = rate_of_rate(i, y);
-      approach_[i].observe(g.value, g.rate, spring_rate(i));
-      const bool on = std::abs(g.value) < 4e-16;
-      const bool beyond = on ? g.rate > 0 || (g.rate == 0 && push > 0) : g.value > 0;
-      memory_.closed[stops_[i]] = armed_[i] && history_[stops_[i]].closed.value_or(beyond);
-    }
-  }
-
-  /// Second derivative of a joint's coordinate at y, y_dot_, by the change over a short time.
-  double rate_of_rate(size_t stop, const VectorXd& y) {
-    constexpr double h = 1e-7;
-    const double before = gap(stop, (y - h * y_dot_).eval().data()).rate,
-                 after = gap(stop, (y + h * y_dot_).eval().data()).rate;
-    return (after - before) / (2 * h);
+    contacts_.begin(*this);
+    set_closed(contacts_.closed(), memory_);
   }
 
   void follow_turns() {
@@ -185,93 +181,46 @@ class MultipliersFlight final : public DaeProblem {
     assembly_.finish(size(), options_.linear_solver == "dense");
   }
 
-  bool stopped() {
-    const bool stop = options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed);
-    result_.summary.interrupted = result_.summary.interrupted || stop;
-    return stop;
-  }
-
-  /// What an interruption here would leave.
-  void checkpoint() {
-    if (so_far_) {
-      const size_t outputs = result_.time.size();
-      const MultipliersSummary before = result_.summary;
-      result_.summary.interrupted = true;
-      finish();
-      so_far_(result_, outputs);
-      result_.summary = before;
-      result_.time.resize(outputs), result_.states.resize(outputs), result_.balance.resize(outputs);
-    }
-    clock_.restart();
-  }
-
-  /// One step, and what it met. Where it fails, state and outputs are those before.
-  void advance() {
-    before_.resize(stops_.size());
-    for (size_t i = 0; i < stops_.size(); ++i) before_[i] = clearance(i, y_);
-    const double t0 = t_;
-    y_before_ = y_;
-    try {
-      step();
-    } catch (const NumericalError&) {
-      t_ = t0, y_.swap(y_before_);
-      throw;
-    }
-    write_outputs();
-    scales_->observe(y_);
-    follow_turns();
-    if (switch_contacts() || at_corner()) {
+  void restart() override {
+    set_closed(contacts_.closed(), memory_);
+    if (t_ > options_.start) {
       equations_.project(t_, y_);
       equations_.make_consistent(t_, y_, y_dot_, memory_);
-      ida_->restart(t_, y_, y_dot_);
-      ++result_.summary.restarts;
     }
-    if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
+    ida_->restart(t_, y_, y_dot_);
   }
 
-  void step() {
-    const double t0 = t_;
+  void step(double limit, double& t, VectorXd& y) override {
+    std::vector<Clearance> before;
+    for (size_t i = 0; i < contacts_.size(); ++i) before.push_back(clearance(i, y));
+    const double t0 = t;
+    std::vector<int>& crossed = contacts_.crossed();
     try {
-      ida_->step(limit(), t_, y_, crossed_);
+      ida_->step(limit, t, y, crossed);
     } catch (const NumericalError& error) {
-      if (constraint_rank(equations_, t_, y_.data()).margin < 3e-2 * margin_) throw_locked();
-      const std::string body = body_without_inertia(equations_, t_, y_.data());
-      if (!body.empty()) throw NumericalError(fmt::format("t = {:.9g} s: {}", t_, body));
+      if (constraint_rank(equations_, t, y.data()).margin < 3e-2 * margin_) throw_locked(t, y);
+      const std::string body = body_without_inertia(equations_, t, y.data());
+      if (!body.empty()) throw NumericalError(fmt::format("t = {:.9g} s: {}", t, body));
       throw;
     }
-    if (++steps_ > options_.max_steps)
-      throw NumericalError(
-          fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t_, options_.duration));
-    if (!y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", t_));
-    if (std::all_of(crossed_.begin(), crossed_.end(), [](int c) { return c == 0; })) find_short_contacts(t0);
-    watch_constraints();
+    if (std::ranges::all_of(crossed, [](int c) { return c == 0; })) find_short_contacts(t0, before, t, y);
+    // Only a crossing away from where the flag is counts: the state may lie a rounding error behind the stop.
+    for (size_t i = 0; i < contacts_.size(); ++i) {
+      const double rate = gap(i, y.data()).rate;
+      const bool counts = crossed[i] != 0 && (contacts_.closed()[i] ? rate < 0 : rate > 0);
+      crossed[i] = !counts ? 0 : contacts_.closed()[i] ? -1 : 1;
+    }
+    watch_constraints(t, y);
   }
 
-  /// Where the next step must end at the latest. What is nearer than round-off is reached.
-  double limit() const {
-    const double reached = t_ + round_off();
-    double end = options_.duration;
-    const auto corner = std::upper_bound(options_.corners.begin(), options_.corners.end(), reached);
-    if (corner != options_.corners.end()) end = std::min(end, *corner);
-    if (const double output = output_time(); options_.step_to_outputs && output > reached) end = std::min(end, output);
-    return end;
-  }
-
-  bool at_corner() const {
-    return std::any_of(options_.corners.begin(), options_.corners.end(),
-                       [this](double c) { return std::abs(c - t_) <= round_off(); });
-  }
-
-  double round_off() const { return 1e-14 * options_.duration; }
-
-  [[noreturn]] void throw_locked() {
+  [[noreturn]] void throw_locked(double t, const VectorXd& y) {
     throw NumericalError(fmt::format("joint \"{}\" locks at t = {:.6g} s: the joints leave no consistent velocity",
-                                     locked_joint(equations_, t_, y_.data()), t_));
+                                     locked_joint(equations_, t, y.data()), t));
   }
 
   /// Drift, rows that were left out, and whether the constraints are still independent.
-  void watch_constraints() {
-    equations_.row_violations(t_, y_.data(), rows_.data(), rates_.data());
+  void watch_constraints(double t, const VectorXd& y) {
+    equations_.row_violations(t, y.data(), rows_.data(), rates_.data());
     const Violation g = violation(equations_, rows_), g_dot = violation(equations_, rates_);
     MultipliersSummary& s = result_.summary;
     s.position_drift = std::max(s.position_drift, g.position);
@@ -279,29 +228,30 @@ class MultipliersFlight final : public DaeProblem {
     s.velocity_drift = std::max(s.velocity_drift, g_dot.position);
     s.angular_velocity_drift = std::max(s.angular_velocity_drift, g_dot.angle);
     for (const BodyPlaces& at : equations_.places())
-      s.quaternion_drift = std::max(s.quaternion_drift, std::abs(y_.segment<4>(at.p).norm() - 1));
+      s.quaternion_drift = std::max(s.quaternion_drift, std::abs(y.segment<4>(at.p).norm() - 1));
     if (std::max(g.position, g.angle) > 1e-6 + options_.tolerance) {
       const RowName worst = g.position > g.angle ? g.worst_position : g.worst_angle;
       throw NumericalError(fmt::format(
           "{}: violated by {:.3g} at t = {:.6g} s; it depended on other joints at the start and does so no more",
-          describe(equations_, worst), std::max(g.position, g.angle), t_));
+          describe(equations_, worst), std::max(g.position, g.angle), t));
     }
-    if (steps_ % 16 == 0 && constraint_rank(equations_, t_, y_.data()).margin < 1e-7 * margin_) throw_locked();
+    if (steps() % 16 == 0 && constraint_rank(equations_, t, y.data()).margin < 1e-7 * margin_) throw_locked(t, y);
   }
 
   Clearance clearance(size_t i, const VectorXd& y) {
-    const double side = memory_.closed[stops_[i]] ? 1 : -1;
+    const double side = contacts_.closed()[i] ? 1 : -1;
     const DriveMotion<double> g = gap(i, y.data());
     return {0, side * g.value, side * g.rate};
   }
 
   /// IDA looks at the signs at both ends of a step: a contact that begins and ends within it is found here.
-  void find_short_contacts(double t0) {
-    const double length = t_ - t0;
+  void find_short_contacts(double t0, const std::vector<Clearance>& before, double& t, VectorXd& y) {
+    const double length = t - t0;
     double first = length;
-    for (size_t i = 0; i < stops_.size(); ++i) {
-      if (!armed_[i] || !(before_[i].slope < 0)) continue;
-      Clearance to = clearance(i, y_);
+    std::vector<int>& crossed = contacts_.crossed();
+    for (size_t i = 0; i < contacts_.size(); ++i) {
+      if (!contacts_.armed()[i] || !(before[i].slope < 0)) continue;
+      Clearance to = clearance(i, y);
       to.c = length;
       if (!(to.slope > 0) || to.value < 0) continue;
       const auto at = [&](double c) {
@@ -311,112 +261,30 @@ class MultipliersFlight final : public DaeProblem {
         here.c = c;
         return here;
       };
-      const double root = crossing_between(at, before_[i], to, 4e-16 * t_);
+      const double root = crossing_between(at, before[i], to, 4e-16 * t);
       // At round-off of the gap it may be no crossing to those who look at the rate: then the step ends where it ended,
       // for the next one starts there.
       if (root >= first || !(at(root).slope < 0)) continue;
-      std::fill(crossed_.begin(), crossed_.end(), 0);
-      crossed_[i] = memory_.closed[stops_[i]] ? -1 : 1;
+      std::ranges::fill(crossed, 0);
+      crossed[i] = contacts_.closed()[i] ? -1 : 1;
       first = root;
     }
     if (first == length) return;
-    t_ = t0 + first;
-    ida_->interpolate(t_, y_);
+    t = t0 + first;
+    ida_->interpolate(t, y);
   }
 
-  bool switch_contacts() {
-    bool changed = false;
-    for (size_t i = 0; i < stops_.size(); ++i) {
-      const size_t joint = stops_[i];
-      const DriveMotion<double> g = gap(i, y_.data());
-      double &largest = history_[joint].largest_rate, &reach = history_[joint].largest_gap;
-      largest = std::max(largest, std::abs(g.rate));
-      reach = std::max(reach, std::abs(g.value));
-      const double noise = options_.tolerance * reach;
-      const bool closed = memory_.closed[joint];
-      const bool slipped = armed_[i] && crossed_[i] == 0 && (closed ? g.value < -noise : g.value > noise);
-      // Only a crossing away from where the flag is counts: the state may lie a rounding error behind the stop.
-      const bool crossed = (crossed_[i] != 0 && (closed ? g.rate < 0 : g.rate > 0)) || slipped;
-      if (crossed && has_decayed(i, g.rate)) {
-        settle(i);
-        changed = true;
-      } else if (crossed) {
-        memory_.closed[joint] = !closed;
-        result_.events.push_back({t_, static_cast<int>(joint), !closed, g.rate});
-        chatter_.contact(t_, scene_.joints[joint].name);
-        changed = true;
-        approach_[i].restart(g.rate);
-        if (std::abs(g.rate) * period(i) < small(i) && !pushed(i, small(i))) settle(i);
-      } else if (!armed_[i] && std::max(std::abs(g.rate) * period(i), g.value) > 2 * std::max(small(i), asleep_[i])) {
-        history_[joint].settled = -1;
-        asleep_[i] = 0;
-        armed_[i] = 1;
-        memory_.closed[joint] = g.value > 0;
-        changed = true;
-      }
-      approach_[i].observe(g.value, g.rate, spring_rate(i));
-    }
-    return changed;
+  void interpolate(double t, VectorXd& y) override { ida_->interpolate(t, y); }
+
+  void observe(const VectorXd& y) override {
+    scales_->observe(y);
+    follow_turns();
   }
 
-  void settle(size_t i) {
-    history_[stops_[i]].settled = t_;
-    armed_[i] = 0;
-    memory_.closed[stops_[i]] = 0;
-  }
-
-  /// Is a crossing at this rate but the end of a motion that has died out on its way to the stop?
-  bool has_decayed(size_t i, double rate) {
-    if (!approach_[i].has_decayed(rate)) return false;
-    const double noise = local_share * options_.tolerance * history_[stops_[i]].largest_gap;
-    asleep_[i] = std::max({small(i), approach_[i].round_off() * period(i), noise});
-    return std::abs(rate) * period(i) < asleep_[i] && !pushed(i, asleep_[i]);
-  }
-
-  double inertia(size_t i) const {
-    const Joint& joint = scene_.joints[stops_[i]];
-    const ReducedBody& body = scene_.bodies[static_cast<size_t>(std::max(joint.b.body, 0))];
-    return joint.kind == JointKind::hinge ? body.J0.trace() / 3 : body.m;
-  }
-
-  /// Time scale of a joint on its stop [s].
-  double period(size_t i) const {
-    const HingeMechanism& m = scene_.joints[stops_[i]].mechanism;
-    return std::sqrt(inertia(i) / (m.stiffness + m.stop_stiffness));
-  }
-
-  /// Of a joint off its stop [rad/s].
-  double spring_rate(size_t i) const { return std::sqrt(scene_.joints[stops_[i]].mechanism.stiffness / inertia(i)); }
-
-  /// Size of motions about the stop that are not followed: those the scene does not ask for, and round-off of the gap.
-  double small(size_t i) const {
-    constexpr double round_off = 1e-14;
-    return std::max(settle_ * history_[stops_[i]].largest_rate * period(i), round_off);
-  }
-
-  /// Does something push a joint that is on its stop, so that it will not stay there?
-  bool pushed(size_t i, double least) {
-    VectorXd y = y_;
-    equations_.make_consistent(t_, y, y_dot_, memory_);
-    return std::abs(rate_of_rate(i, y)) * period(i) * period(i) > 2 * least;
-  }
-
-  void write_outputs() {
-    for (double next = output_time(); next <= t_ && !stopped(); next = output_time()) {
-      if (next == t_) {
-        record(next, y_);
-      } else {
-        sample_.resize(size());
-        ida_->interpolate(next, sample_);
-        record(next, sample_);
-      }
-    }
-  }
-
-  double output_time() const { return outputs_.after(result_.time.size()); }
+  void keep_rows(size_t rows) override { result_.states.resize(rows), result_.balance.resize(rows); }
 
   /// Multipliers of an output are those of its motion, not interpolated.
-  void record(double t, VectorXd y) {
+  void record(double t, VectorXd y) override {
     VectorXd y_dot;
     equations_.make_consistent(t, y, y_dot, memory_);
     MultibodyState s;
@@ -443,43 +311,25 @@ class MultipliersFlight final : public DaeProblem {
     result_.balance.push_back(balance);
   }
 
-  void finish() {
+  void finish() override {
     MultipliersSummary& s = result_.summary;
-    if (s.interrupted && result_.time.back() < t_) record(t_, y_);
     const DaeCounts c = ida_->counts();
     s.steps = c.steps, s.residual_evaluations = c.residual_evaluations, s.factorisations = c.factorisations;
     s.newton_iterations = c.newton_iterations, s.error_test_failures = c.error_test_failures;
     s.convergence_failures = c.convergence_failures;
-    s.seconds = watch_.seconds();
-    s.stops = history_;
-    for (const size_t joint : stops_) s.stops[joint].closed = memory_.closed[joint] != 0;
     set_drifts(scene_, options_.largest, result_);
   }
 
-  Equations equations_;
+  Equations& equations_;
   const Multibody& scene_;
   const MultipliersOptions& options_;
-  const Checkpoint<MultibodyTrajectory>& so_far_;
-  CheckpointClock clock_;
-  Stopwatch watch_;
-  OutputTimes outputs_;
-  double settle_, margin_ = 1, t_;
-  std::vector<StopHistory> history_;  // per joint
+  double margin_ = 1;
   JointMemory memory_;
-  std::vector<size_t> stops_;  // joints with a stop
-  std::vector<char> armed_;    // per stop
-  std::vector<int> crossed_;
-  std::vector<Approach> approach_;  // per stop
-  ChatterGuard chatter_;
-  std::vector<double> asleep_;  // motions below this do not wake a joint that has settled on its way [rad] or [m]
-  std::vector<Clearance> before_;
-  VectorXd y_, y_before_, y_dot_, sample_, rows_, rates_;
+  VectorXd y_dot_, sample_, rows_, rates_;
   redundant::PatternSum assembly_;
   std::unique_ptr<FlightFrame> frame_;
   std::unique_ptr<StateScales> scales_;
   std::unique_ptr<Ida> ida_;
-  long steps_ = 0;
-  MultibodyTrajectory result_;
 };
 
 }  // namespace
@@ -490,7 +340,8 @@ MultibodyTrajectory integrate_multipliers(const Multipliers& system, const std::
   check_options(options, system.multibody().joints.size());
   require(options.angles.empty() || options.angles.size() == system.multibody().joints.size(),
           "one angle per joint is needed");
-  return MultipliersFlight(system, start, options, so_far).fly();
+  Equations equations(system.impl());
+  return MultipliersFlight(system, equations, start, options, so_far).fly();
 }
 
 }  // namespace flexboom

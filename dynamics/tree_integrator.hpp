@@ -25,7 +25,7 @@ struct TreeTrajectory {
   std::vector<double> time;
   std::vector<Eigen::VectorXd> y;  // Tree::layout(), prescribed coordinates as prescribed
   std::vector<TreeBalance> balance;
-  std::vector<Event> events;                         // `hinge` is the joint
+  std::vector<StopEvent> events;
   IntegrationSummary summary;                        // momentum_drift: unknown where something holds or pushes
   std::vector<LargestStiffening> stiffening_effect;  // per body, at the outputs
   std::vector<std::string> warnings;

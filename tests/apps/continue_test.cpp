@@ -45,11 +45,11 @@ void expect_same(const RunResult& whole, const RunResult& first, const RunResult
     if (column(whole, name).cwiseAbs().maxCoeff() < 1e-15) continue;  // round-off of what is zero
     EXPECT_LT(difference(whole, later, name), outputs) << name;
   }
-  std::vector<Event> events = first.trajectory.events;
+  std::vector<StopEvent> events = first.trajectory.events;
   events.insert(events.end(), later.trajectory.events.begin(), later.trajectory.events.end());
   ASSERT_EQ(events.size(), whole.trajectory.events.size());
   for (size_t i = 0; i < events.size(); ++i) {
-    EXPECT_EQ(events[i].hinge, whole.trajectory.events[i].hinge) << i;
+    EXPECT_EQ(events[i].joint, whole.trajectory.events[i].joint) << i;
     EXPECT_EQ(events[i].contact, whole.trajectory.events[i].contact) << i;
     EXPECT_NEAR(events[i].time, whole.trajectory.events[i].time, event_times) << i;
   }

@@ -53,10 +53,11 @@ TEST(PaperFigures, ElasticCoordinatePeaksAtEachStopContact) {
     const auto at = [&](double t) { return static_cast<size_t>(t / r.scene.output_step); };
     int contacts = 0;
     for (size_t i = 0; i + 1 < r.trajectory.events.size(); ++i) {
-      const Event& e = r.trajectory.events[i];
-      if (r.bodies[static_cast<size_t>(e.hinge)].body.name != boom || !e.contact || std::abs(e.rate) < 0.02) continue;
-      const auto release = std::find_if(r.trajectory.events.begin() + static_cast<std::ptrdiff_t>(i) + 1,
-                                        r.trajectory.events.end(), [&](const Event& f) { return f.hinge == e.hinge; });
+      const StopEvent& e = r.trajectory.events[i];
+      if (r.bodies[static_cast<size_t>(e.joint)].body.name != boom || !e.contact || std::abs(e.rate) < 0.02) continue;
+      const auto release =
+          std::find_if(r.trajectory.events.begin() + static_cast<std::ptrdiff_t>(i) + 1, r.trajectory.events.end(),
+                       [&](const StopEvent& f) { return f.joint == e.joint; });
       if (release == r.trajectory.events.end()) break;
       // The largest deflection from one free flight to the next lies while the stop is closed, and is a multiple of
       // that before.
@@ -96,7 +97,7 @@ TEST(PaperFigures, HubTurnsMostAboutX1DrivenBySip) {
   const auto without = [](const std::string& boom) {       // that boom starts deployed and at rest
     Scene scene = sport("beam");
     scene.duration = 1;
-    for (HingeScene& h : scene.hinges)
+    for (HingeScene& h : scene.joints)
       if (h.body == boom) h.start_angle = pi / 2;
     return hub_rotation(run_scene(scene, {}));
   };
@@ -239,7 +240,7 @@ Scene conservative(double duration) {
   scene.tolerance = 1e-10;
   scene.duration = duration;
   for (BodyScene& b : scene.bodies) b.damping = {};
-  for (HingeScene& h : scene.hinges) h.hinge.mechanism.damping = 0;
+  for (HingeScene& h : scene.joints) h.hinge.mechanism.damping = 0;
   return scene;
 }
 
