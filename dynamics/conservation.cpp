@@ -25,7 +25,9 @@ bool is_held(const Multibody& scene) {
          std::ranges::any_of(scene.springs, grounded);
 }
 
-bool is_isolated(const Multibody& scene) { return scene.loads.empty() && scene.gravity.isZero(0) && !is_held(scene); }
+bool is_isolated(const Multibody& scene) {
+  return scene.loads.empty() && scene.gravity.isZero(0) && !scene.field && !is_held(scene);
+}
 
 Conservation::Conservation(double mass, double inertia, const MotionScales& before)
     : mass_(mass), inertia_(inertia), largest_(before) {}

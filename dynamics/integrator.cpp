@@ -214,11 +214,11 @@ class SystemFlight final : public Flight<Trajectory> {
     return system_.gap_rate(y_dot_.data(), static_cast<int>(stop));
   }
 
-  /// The exponential method has no error in what a hinge does when it hardly moves.
+  /// The exponential method has no error in what a hinge does when it hardly moves, and errors may be weighed by that.
   double noise(size_t stop) const override {
     const ErrorScale& error = scales_.error();
-    if (method_.make_of_system != nullptr) return 1e-14 * contacts_.largest_gap(stop);
-    return noise_of_methods * error.tolerance * error.scale[system_.layout().body[stop]];
+    const double of_steps = noise_of_methods * error.tolerance * error.scale[system_.layout().body[stop]];
+    return method_.make_of_system != nullptr ? std::min(of_steps, 1e-14 * contacts_.largest_gap(stop)) : of_steps;
   }
 
   void put_on_stop(size_t stop) override { y_[system_.layout().body[stop]] = 0; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "dynamics/gravity.hpp"
 #include "dynamics/hinge.hpp"
 #include "reduction/reduced_body.hpp"
 
@@ -7,6 +8,7 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -81,6 +83,8 @@ struct Multibody {
   std::vector<Load> loads;
   std::vector<ReactionWheel> wheels;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // uniform, inertial axes [m/s^2]
+  /// Instead: of a planet. Positions are from the reference point of the orbit, whose free fall is taken off.
+  std::optional<OrbitalField> field{};
 };
 
 }  // namespace flexboom

@@ -59,6 +59,7 @@ void check_mechanism(const HingeMechanism& m, const std::string& of) {
 
 void check(const Multibody& scene) {
   require(scene.gravity.allFinite(), "the gravity is not finite");
+  require(!scene.field || scene.gravity.isZero(0), "gravity: is either uniform or that of a planet");
   for (const ReducedBody& body : scene.bodies) body.validate();
   for (const Joint& joint : scene.joints) check_joint(scene, joint);
   for (const SpringDamper& s : scene.springs) {

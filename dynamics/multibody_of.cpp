@@ -6,6 +6,7 @@ namespace flexboom {
 
 Multibody multibody_of(const System& system) {
   Multibody scene;
+  scene.field = system.field();
   const bool free = !system.fixed_hub();
   if (free) {
     scene.bodies.push_back(system.hub());

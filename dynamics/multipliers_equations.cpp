@@ -177,10 +177,27 @@ void Equations::body_residual(size_t i, const double* y, const double* y_dot, do
   for (int k = 0; k < at.n; ++k) F[at.u + k] += scratch_->bodies[i].on_q[static_cast<size_t>(k)];
 }
 
+double Equations::pull_by_field(size_t i, double t, const double* y, double* F) const {
+  const BodyPlaces& at = places_[i];
+  const Eigen::Matrix3d A = rotation_matrix(Map<const Eigen::Vector4d>(y + at.p));
+  const Map<const VectorXd> q(y + at.q, at.n), u(y + at.u, at.n);
+  const BodyGravity g =
+      body_gravity(scene_.bodies[i], scene_.field->at(t, Map<const Eigen::Vector3d>(y + at.R)).in_axes(A), q);
+  const Eigen::Vector3d force = A * g.force;
+  Map<Eigen::Vector3d>(F + at.v) -= force;
+  Map<Eigen::Vector3d>(F + at.w) -= g.torque;
+  Map<VectorXd>(F + at.u, at.n) -= g.modal;
+  return force.dot(Map<const Eigen::Vector3d>(y + at.v)) + g.torque.dot(Map<const Eigen::Vector3d>(y + at.w)) +
+         g.modal.dot(u);
+}
+
 void Equations::residual(double t, const double* y, const double* y_dot, const JointMemory& memory, double* F) {
   std::fill(F, F + size_, 0.0);
   double power = 0, loss = 0;
-  for (size_t i = 0; i < places_.size(); ++i) body_residual(i, y, y_dot, F);
+  for (size_t i = 0; i < places_.size(); ++i) {
+    body_residual(i, y, y_dot, F);
+    if (scene_.field) power += pull_by_field(i, t, y, F);
+  }
   for (size_t i = 0; i < joints_.size(); ++i) {
     const JointData& j = joints_[i];
     if (j.rows.empty() && !j.mechanism) continue;

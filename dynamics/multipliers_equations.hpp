@@ -142,6 +142,9 @@ class Equations {
   void scatter_correction(const PlaceData&, const PlaceForce<double>&, const double* y, double* F) const;
   RowMultipliers multipliers(const JointData&, const double* y) const;
   void body_residual(size_t i, const double* y, const double* y_dot, double* F);
+  /// Adds the field's gravity on body i to its rows; its power [W]. The Newton matrix leaves out its derivatives, which
+  /// are of the size of the orbital rate squared.
+  double pull_by_field(size_t i, double t, const double* y, double* F) const;
   void body_newton(size_t i, double t, double c, const double* y, const double* y_dot, PatternSum&);
   void pair_newton(const JointData&, const Eigen::MatrixXd& derivatives, bool velocities, const double* y, PatternSum&);
 

@@ -340,6 +340,7 @@ MultibodyTrajectory integrate_multipliers(const Multipliers& system, const std::
   check_options(options, system.multibody().joints.size());
   require(options.angles.empty() || options.angles.size() == system.multibody().joints.size(),
           "one angle per joint is needed");
+  if (system.multibody().field) system.multibody().field->orbit.at(options.duration);  // does it last so long?
   Equations equations(system.impl());
   return MultipliersFlight(system, equations, start, options, so_far).fly();
 }

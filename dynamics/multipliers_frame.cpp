@@ -9,7 +9,7 @@ using Eigen::VectorXd;
 
 FlightFrame::FlightFrame(const Equations& equations, const std::vector<BodyState>& start, double t)
     : gravity_(equations.scene().gravity), start_(t), loaded_(!equations.scene().loads.empty()) {
-  if (is_held(equations.scene())) return;
+  if (is_held(equations.scene()) || equations.scene().field) return;  // where in the field matters
   const VectorXd y = equations.pack(start);
   for (size_t i = 0; i < start.size(); ++i) {
     const double m = equations.scene().bodies[i].m;

@@ -25,7 +25,9 @@ double energy_scale(const Equations& equations, double at_start, const VectorXd&
     begun += (b.m * y_dot.segment<3>(at.v).squaredNorm() + b.J0.trace() / 3 * y_dot.segment<3>(at.w).squaredNorm()) *
              time * time / 2;
   }
-  return begun > nothing * slow ? begun : slow;
+  constexpr double hardly =
+      1e-6;  // of what slow bodies have: beside gravity's gradient it is what comes later that counts
+  return begun > nothing * slow ? std::max(begun, hardly * slow) : slow;
 }
 
 }  // namespace

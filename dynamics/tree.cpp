@@ -21,6 +21,7 @@ using Eigen::VectorXd;
 namespace tree {
 
 void set_instant(const Model& model, double t, Instant& instant) {
+  instant.time = t;
   for (size_t i = 0; i < model.links.size(); ++i) {
     const Link& link = model.links[i];
     if (!link.prescribed) continue;

@@ -69,6 +69,36 @@ void pull_spring(const Model& model, const SpringModel& spring, const T* y, Scra
   scratch.loss += spring.damping * (rate * rate);
 }
 
+/// Gravity of a field on a link: m a + G mc, mc x a + axial(G J), Ct^T a - 1/2 G : dJ/dq_k. In derivatives the field
+/// stays what it is at the link's place: it changes over the size of an orbit.
+template <class T>
+void pull_by_field(const Link& link, const OrbitalField& field, double t, const T* y, LinkScratch<T>& s, T& power) {
+  const Eigen::Vector3d place(value_of(s.R0.x), value_of(s.R0.y), value_of(s.R0.z));
+  const LocalGravity gravity = field.at(t, place);
+  const equations::Gravity<T> in_space = {equations::lift<T>(spatial::vec3(gravity.acceleration)),
+                                          equations::lift<T>(spatial::sym3(gravity.gradient))};
+  const equations::Gravity<T> here = in_space.at(Vec3<T>{}, s.A0);
+  const Vec3<T>& a = here.acceleration;
+  const Sym3<T>& G = here.gradient;
+  const equations::Body& body = link.body;
+  const T *q = y + link.q, *q_dot = y + link.q_dot;
+  const equations::Inertia<T> inertia = equations::inertia_at(body, q, q_dot, s.modes);
+  const Vec3<T> force = T(body.m) * a + G * inertia.mc;
+  const Vec3<T> torque = cross(inertia.mc, a) + equations::gradient_torque(G, inertia.J);
+  s.external += Twist<T>{force, torque};
+  power += dot(s.A0 * force, s.v0) + dot(torque, s.w) - 0.5 * equations::contraction(G, inertia.J_dot);
+  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) {
+    const T modal = dot(a, equations::lift<T>(body.Ct[k]));
+    s.external_modal[k] += modal;
+    power += modal * q_dot[k];
+  }
+  const T g[] = {G.xx, G.yy, G.zz, 2.0 * G.xy, 2.0 * G.yz, 2.0 * G.zx};
+  for (const equations::Term& term : body.J1)
+    s.external_modal[static_cast<size_t>(term.k)] -= 0.5 * term.value * g[term.component];
+  for (const equations::Term& term : body.J2)
+    s.external_modal[static_cast<size_t>(term.k)] -= term.value * q[term.l] * g[term.component];
+}
+
 /// Sums all external loads of the links.
 template <class T>
 void apply_forces(const Model& model, const T* y, const Instant& instant, Scratch<T>& scratch) {
@@ -83,6 +113,9 @@ void apply_forces(const Model& model, const T* y, const Instant& instant, Scratc
     at.push(force, torque);
     scratch.power += dot(force, at.velocity) + dot(torque, at.omega);
   }
+  if (const auto& field = model.scene->field)
+    for (size_t i = 0; i < model.links.size(); ++i)
+      pull_by_field(model.links[i], *field, instant.time, y, scratch.links[i], scratch.power);
   for (const SpringModel& spring : model.springs) pull_spring(model, spring, y, scratch);
   for (size_t i = 0; i < model.wheels.size(); ++i) {  // torque of the rotor, and its momentum turned with the body
     LinkScratch<T>& s = scratch.links[static_cast<size_t>(model.wheels[i].link)];

@@ -220,6 +220,7 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
                          const Checkpoint<TreeTrajectory>& so_far) {
   check_options(o, tree.scene().joints.size());
   require(y0.size() == tree.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
+  if (tree.scene().field) tree.scene().field->orbit.at(o.duration);  // does it last so long?
   VectorXd start = y0;
   tree.impose(o.start, start);
   return TreeFlight(tree, start, o, method_of(o), so_far).fly();

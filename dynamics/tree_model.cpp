@@ -213,7 +213,7 @@ void add_forces(const Multibody& scene, Model& model) {
     on.at.position = link.brf_axes * vec3(w.axis);
     model.wheels.push_back(on);
   }
-  model.poses = !scene.loads.empty() || !scene.springs.empty();
+  model.poses = !scene.loads.empty() || !scene.springs.empty() || scene.field;
   model.forces = model.poses || !scene.wheels.empty();
 }
 

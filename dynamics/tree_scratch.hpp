@@ -73,6 +73,7 @@ struct Instant {
   struct Drive {
     std::array<double, 2> value{}, rate{}, acceleration{};
   };
+  double time = 0;                   // [s]
   std::vector<Drive> drives;         // per link
   std::vector<Twist<double>> loads;  // in their own axes
   std::vector<double> wheels;        // torques

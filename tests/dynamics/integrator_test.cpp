@@ -243,7 +243,7 @@ TEST(Integrator, SettledHingesAreReportedAndNoLongerLogged) {
   const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + 0.05})), o);
   EXPECT_LT(r.events.size(), 25U);
   EXPECT_GT(r.summary.stops[0].settled, 0);
-  EXPECT_LT(std::abs(r.events.back().rate), 1e-8 * 7);
+  EXPECT_LT(std::abs(r.events.back().rate), 1e-6 * 7);  // the tolerance of the largest
 }
 
 TEST(Integrator, NamesTheMethodsThatExist) {

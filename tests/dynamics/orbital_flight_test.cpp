@@ -1,7 +1,11 @@
 // Flights in the field of a planet: attitude against independent solutions, and no digits lost to its distance.
 
+#include "dynamics/formulations.hpp"
 #include "dynamics/integrator.hpp"
+#include "dynamics/multibody_of.hpp"
+#include "dynamics/multipliers.hpp"
 #include "dynamics/rotation.hpp"
+#include "dynamics/tree_integrator.hpp"
 #include "dynamics_testing.hpp"
 #include "fem/check.hpp"
 #include "sport_testing.hpp"
@@ -15,6 +19,7 @@
 namespace flexboom {
 namespace {
 
+using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
@@ -223,6 +228,54 @@ TEST(OrbitalFlight, DistanceOfThePlanetCostsNoDigits) {
   const Vector3d R(4.1e6, -3.2e6, 4.4e6), rho(0.011, -0.007, 0.013), exact = differential_gravity({}, R, rho);
   EXPECT_GT(((R + rho) - R - rho).norm(), 1e-9 * rho.norm());
   EXPECT_GT((gravity({}, R + rho) - gravity({}, R) - exact).norm(), 1e-9 * exact.norm());
+}
+
+/// An orbit of two minutes, eccentric and about an oblate planet, so that gravity shows beside impacts of the booms.
+TEST(OrbitalFlight, TreesAndMultipliersFlyAsTheHub) {
+  const double far = 7e6;
+  const OrbitalElements elements = {.semi_major_axis = far, .eccentricity = 0.1, .inclination = 0.9, .periapsis = 0.4};
+  const Planet planet = {.mu = 0.05 * 0.05 * far * far * far, .radius = 6e6, .J2 = earth_J2};
+  const double duration = 3;
+  const std::vector<double> angles(4, pi / 2 - 0.05);
+  const System system = sport(OrbitalField{Orbit(elements, planet, duration)});
+  const VectorXd y0 = system.pack(turning_with_orbit(system, angles, {0.1, -0.2, 0.3}));
+  const Trajectory hub = integrate(system, y0, options("exponential", 1e-11, duration, 0.1));
+  const Trajectory without = [&] {
+    const System alone = sport({});
+    return integrate(alone, y0, options("exponential", 1e-11, duration, 0.1));
+  }();
+  ASSERT_GT(hub.events.size(), 5u);
+
+  const Index motion = system.layout().dissipated();
+  const auto apart = [&](size_t i, const VectorXd& y) {
+    return (y.head(motion) - hub.y[i].head(motion)).cwiseAbs().maxCoeff();
+  };
+  double of_field = 0;
+  for (size_t i = 0; i < hub.y.size(); ++i) of_field = std::max(of_field, apart(i, without.y[i]));
+  EXPECT_GT(of_field, 1e-4);
+
+  const Tree tree(multibody_of(system));
+  VectorXd start = VectorXd::Zero(tree.layout().size);
+  start.head(motion) = y0.head(motion);
+  const TreeTrajectory of_tree = integrate(tree, start, options("adams", 1e-11, duration, 0.1));
+  double error = 0;
+  for (size_t i = 0; i < hub.y.size(); ++i) error = std::max(error, apart(i, of_tree.y[i]));
+  EXPECT_LT(error, 1e-8);
+  EXPECT_LT(of_tree.summary.energy_balance, 1e-9);
+
+  const Multipliers multipliers(multibody_of(system));
+  MultipliersOptions o{options("ida", 1e-11, duration, 0.1)};
+  o.angles.assign(5, angles[0]);
+  const MultibodyTrajectory by_multipliers = integrate_multipliers(multipliers, body_states(tree, 0, start), o);
+  double error_by_multipliers = 0;
+  for (size_t i = 0; i < hub.y.size(); ++i)
+    error_by_multipliers =
+        std::max(error_by_multipliers, apart(i, tree.pack(tree_state(multipliers, by_multipliers.states[i]))));
+  EXPECT_LT(error_by_multipliers, 1e-8);
+  EXPECT_LT(by_multipliers.summary.energy_balance, 1e-9);
+  std::printf("in orbit: %.1e of the hub's motion by gravity; tree %.1e, energy %.1e; multipliers %.1e, energy %.1e\n",
+              of_field, error, of_tree.summary.energy_balance, error_by_multipliers,
+              by_multipliers.summary.energy_balance);
 }
 
 }  // namespace
