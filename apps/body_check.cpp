@@ -255,12 +255,6 @@ void check_body(const BodyScene& body, const std::string& path, Faults& faults) 
   if (!body.stiffening.empty()) check_stiffening(faults, path, body);
   if (body.rigid) return check_rigid(faults, path, *body.rigid);
   if (body.reduced || !body.reduced_file.empty()) return check_damping(faults, join(path, "damping"), body.damping);
-  if (body.structure == "solid" && !path.empty()) {
-    faults.add(
-        join(path, "structure"),
-        "\"solid\" has modes and a mesh but does not fly in this version; in a scene it must be \"beam\", \"eq14\" or "
-        "\"rigid\"");
-  }
   check_name_among(faults, join(path, "structure"), body.structure, scene_keys::structures);
   check_name_among(faults, join(path, "directions"), body.directions, scene_keys::directions);
   check_name_among(faults, join(path, "backend"), body.backend, backend_names());

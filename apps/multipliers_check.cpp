@@ -11,8 +11,6 @@ void check_multipliers(const Scene& scene, toml_reader::Faults& faults) {
   constexpr const char* relative = "; formulation = \"relative\" can";
   if (scene.rescale_at_events)
     faults.add("integrator.rescale_at_events", fmt::format("is true, which \"multipliers\" cannot follow{}", relative));
-  if (scene.orbit && scene.orbit->gravity == "differential")
-    faults.add("orbit.gravity", fmt::format("is \"differential\", which \"multipliers\" leave out{}", relative));
 }
 
 }  // namespace flexboom

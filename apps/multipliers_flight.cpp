@@ -261,7 +261,8 @@ Trajectory integrate_by_multipliers(const System& of_hub, const VectorXd& start,
   const auto go_on = [&](const MultibodyTrajectory& flight) {
     for (size_t row = r.time.size(); row < flight.time.size(); ++row) {
       VectorXd y(of_hub.layout().size);
-      y << tree.pack(tree_state(system, flight.states[row])).head(motion), flight.states[row].dissipated;
+      const MultibodyState& s = flight.states[row];
+      y << tree.pack(tree_state(system, s)).head(motion), s.dissipated - s.work;  // a field's work is all there is
       r.y.push_back(std::move(y));
       r.time.push_back(flight.time[row]);
       r.balance.push_back(flight.balance[row]);

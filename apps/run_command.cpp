@@ -129,6 +129,9 @@ void go_on(Scene& scene, const RunArguments& a) {
 
 Scene scene_of(const RunArguments& a) {
   Scene scene = load_scene(a.scene);
+  const std::filesystem::path file = a.scene;
+  scene.bodies_kept_in = builtin_scene(a.scene) != nullptr ? std::filesystem::path("results") / "bodies"
+                                                           : file.parent_path() / (file.stem().string() + "-bodies");
   if (a.duration) scene.duration = *a.duration;
   if (a.tolerance) scene.tolerance = *a.tolerance;
   if (a.output_step) scene.output_step = *a.output_step;

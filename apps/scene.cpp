@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -262,13 +264,7 @@ BodyScene read_reduced_body(TableReader& table, Reading& reading) {
 /// `in_tree`: of a scene with joints.
 BodyScene read_body_entry(TableReader table, bool in_tree, Reading& reading) {
   if (in_tree && table.has("mass")) return read_rigid_body(table, reading);
-  if (table.is_text("file") && table.text("file").ends_with(".h5")) {
-    if (in_tree) return read_reduced_body(table, reading);
-    reading.faults.add(table.path(), table.place("file"),
-                       "file: is a reduced body; a scene of [hub] and [[hinges]] makes its booms from their geometry. "
-                       "Give the scene [[joints]]: the hub is then one of the [[bodies]], each hinge a joint");
-    return {};
-  }
+  if (in_tree && table.is_text("file") && table.text("file").ends_with(".h5")) return read_reduced_body(table, reading);
   const std::string stiffening = in_tree ? table.text("stiffening", "auto") : "";
   BodyScene body;
   if (table.has("file")) {
@@ -339,7 +335,11 @@ void read_integrator(TableReader table, Scene& scene) {
 OrbitScene read_orbit(TableReader table) {
   OrbitScene orbit;
   orbit.altitude = table.number("altitude", orbit.altitude);
+  orbit.eccentricity = table.number("eccentricity", orbit.eccentricity);
   orbit.inclination = table.number("inclination", orbit.inclination);
+  orbit.node = table.number("node", orbit.node);
+  orbit.perigee = table.number("perigee", orbit.perigee);
+  orbit.anomaly = table.number("anomaly", orbit.anomaly);
   orbit.gravity = table.text("gravity", orbit.gravity);
   orbit.J2 = table.boolean("J2", orbit.J2);
   table.reject_unknown();
@@ -364,10 +364,52 @@ void read_initial(TableReader table, Scene& scene) {
 }
 
 void read_around_hub(TableReader& table, Scene& scene, Reading& reading) {
-  if (auto orbit = table.table("orbit")) scene.orbit = read_orbit(*orbit);
   if (auto hub = table.table("hub", true)) scene.hub = read_hub(*hub, reading);
   if (auto initial = table.table("initial")) read_initial(*initial, scene);
   for (TableReader& hinge : table.tables("hinges")) scene.hinges.push_back(read_hinge(hinge));
+}
+
+/// Is there anything that a scene of [hub] and [[hinges]] alone cannot have? They are shorthand then.
+bool beyond_a_hub(TableReader& table) {
+  if (std::ranges::any_of(std::array{"joints", "springs", "loads", "wheels", "turns", "gravity"},
+                          [&](const char* key) { return table.has(key); }))
+    return true;
+  const auto says_more = [](const Value& body) {
+    return std::ranges::any_of(body.entries, [](const auto& entry) {
+      return entry.first == "stiffening" || entry.first == "mass" ||
+             (entry.first == "file" && entry.second.text.ends_with(".h5"));
+    });
+  };
+  for (const auto& [key, value] : table.value().entries)
+    if (key == "bodies") return std::ranges::any_of(value.items, says_more);
+  return false;
+}
+
+/// Writes [hub] and [[hinges]] out: a rigid body that flies, or the inertial frame where it is fixed, and joints.
+void write_out_shorthand(Scene& scene) {
+  const std::string hub = scene.hub.fixed ? "" : "hub";
+  if (!hub.empty()) {
+    BodyScene body;
+    body.name = hub, body.structure = "rigid";
+    body.rigid = RigidScene{.mass = scene.hub.mass, .inertia = scene.hub.inertia, .size = scene.hub.size};
+    scene.bodies.push_back(std::move(body));
+    JointScene flight;
+    flight.name = hub, flight.kind = JointKind::free, flight.b.body = hub;
+    flight.start_omega = scene.start_rate, flight.start_velocity = scene.start_velocity;
+    scene.joints.push_back(std::move(flight));
+  }
+  for (const HingeScene& h : scene.hinges) {
+    JointScene joint;
+    joint.name = h.body;
+    joint.a = {.body = hub, .point = h.hinge.point, .x = h.hinge.stowed};
+    joint.a.z = h.hinge.stowed.cross(h.hinge.outward).normalized();
+    joint.b.body = h.body;
+    joint.mechanism = h.hinge.mechanism;
+    joint.start = {h.start_angle}, joint.start_rate = {h.start_rate};
+    scene.joints.push_back(std::move(joint));
+  }
+  scene.hub = {}, scene.hinges.clear();
+  scene.start_rate.setZero(), scene.start_velocity.setZero();
 }
 
 Scene read_whole_scene(TableReader& table, Reading& reading) {
@@ -377,14 +419,16 @@ Scene read_whole_scene(TableReader& table, Reading& reading) {
   scene.duration = table.number("duration", scene.duration);
   scene.output_step = table.number("output_step", scene.output_step);
   scene.vtu_step = table.number("vtu_step", scene.vtu_step);
-  const bool in_tree = table.has("joints");
+  const bool in_tree = beyond_a_hub(table);
   if (auto accuracy = table.table("accuracy")) read_accuracy(*accuracy, scene);
   if (auto integrator = table.table("integrator")) read_integrator(*integrator, scene);
+  if (auto orbit = table.table("orbit")) scene.orbit = read_orbit(*orbit);
   for (TableReader& body : table.tables("bodies")) {
     scene.bodies.push_back(read_body_entry(body, in_tree, reading));
     warn_of_rigid(scene.bodies.back(), body.path("modes"), body.has("modes"), reading.warnings);
   }
-  in_tree ? read_tree(table, scene) : read_around_hub(table, scene, reading);
+  if (!in_tree || table.has("hub") || table.has("hinges")) read_around_hub(table, scene, reading);
+  if (in_tree) read_tree(table, scene);
   table.reject_unknown();
   return scene;
 }
@@ -407,7 +451,7 @@ Vector3d normal_to(const Vector3d& direction, const Vector3d& unit) {
 double OrbitScene::rate() const {
   constexpr double mu = 3.986004418e14;     // [m^3/s^2], WGS 84
   constexpr double equatorial = 6378137.0;  // [m], WGS 84
-  const double radius = equatorial + altitude;
+  const double radius = (equatorial + altitude) / (1 - eccentricity);
   return std::sqrt(mu / (radius * radius * radius));
 }
 
@@ -417,6 +461,11 @@ Scene parse_scene(const std::string& text, const std::string& file_name, Reading
   const Value root = parse_format(text, file_name, scene_keys::scene_format);
   TableReader table(root, "", reading.faults);
   Scene scene = read_whole_scene(table, reading);
+  if (scene.is_tree && (table.has("hub") || table.has("hinges"))) {
+    check_shorthand(scene, reading.faults);
+    reading.faults.throw_if_any();
+    write_out_shorthand(scene);
+  }
   check_scene(scene, reading.faults);
   reading.faults.throw_if_any();
   warn_of_oddities(scene, reading.warnings);

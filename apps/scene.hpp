@@ -65,11 +65,15 @@ struct HingeScene {
   double start_rate = 0;   // [rad/s]
 };
 
-/// Orbit of the reference point, circular at t = 0: for attitude in the local-vertical local-horizontal frame (x along
-/// the velocity, z to the Earth), with which the hub's axes are aligned at t = 0, and for gravity.
+/// Orbit of the reference point: for attitude in the local-vertical local-horizontal frame (z to the Earth, y against
+/// the orbit's normal), with which the inertial axes are aligned at t = 0, and for gravity.
 struct OrbitScene {
-  double altitude = 405e3;       // above the equatorial radius [m]
+  double altitude = 405e3;       // of the perigee, above the equatorial radius [m]
+  double eccentricity = 0;       // [0, 1)
   double inclination = 0;        // [rad]
+  double node = 0;               // right ascension of the ascending node [rad]
+  double perigee = 0;            // argument, from the node [rad]
+  double anomaly = 0;            // true anomaly at t = 0, from the perigee [rad]
   std::string gravity = "none";  // "none", or "differential": that on the bodies less that on the reference point
   bool J2 = false;               // oblateness of the Earth, in the orbit and in the gravity
   double rate() const;           // mean motion [rad/s]
@@ -104,6 +108,8 @@ struct Scene {
   std::vector<TurnScene> turns;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // inertial axes [m/s^2]
 
+  std::filesystem::path
+      bodies_kept_in;  // where reduced bodies that take long are kept; empty: nowhere; not in the file
   std::shared_ptr<const SavedState> from;  // instead of the start: where an earlier run ended; not part of the file
 
   std::vector<std::string> warnings;  // what was repaired or is odd (e.g. an inertia that is not symmetric)
@@ -124,6 +130,9 @@ std::vector<std::string> builtin_scene_names();
 
 /// The scene as TOML with every default written out; parse_scene reads it back to the same Scene.
 std::string to_toml(const Scene&);
+
+/// A body as [[bodies]] of a scene.
+std::string to_toml(const BodyScene&);
 
 /// Checks that reading can not do line by line (also after command-line overrides). @throws InputError.
 void validate(const Scene&);

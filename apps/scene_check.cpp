@@ -113,9 +113,14 @@ void check_hub(Faults& faults, const Scene& scene) {
 
 void check_orbit(Faults& faults, const OrbitScene& orbit) {
   check_positive(faults, "orbit.altitude", orbit.altitude, " m");
-  if (!(std::abs(orbit.inclination) <= std::numbers::pi)) {
-    faults.add("orbit.inclination", fmt::format("is {} rad; it must lie between -pi and pi", orbit.inclination));
-  }
+  if (!(orbit.eccentricity >= 0 && orbit.eccentricity < 1))
+    faults.add("orbit.eccentricity", fmt::format("is {}; it must lie in [0, 1)", orbit.eccentricity));
+  for (const auto& [key, angle] : {std::pair{"orbit.inclination", orbit.inclination},
+                                   {"orbit.node", orbit.node},
+                                   {"orbit.perigee", orbit.perigee},
+                                   {"orbit.anomaly", orbit.anomaly}})
+    if (!(std::abs(angle) <= 2 * std::numbers::pi))
+      faults.add(key, fmt::format("is {} rad; it must lie between -2 pi and 2 pi", angle));
   if (orbit.gravity != "none" && orbit.gravity != "differential")
     faults.add("orbit.gravity", fmt::format("is \"{}\"; there are \"none\" and \"differential\"", orbit.gravity));
 }
@@ -201,14 +206,30 @@ void check_connections(Faults& faults, const Scene& scene) {
 
 }  // namespace
 
+void check_shorthand(const Scene& scene, Faults& faults) {
+  check_hub(faults, scene);
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].name == "hub" && !scene.hub.fixed)
+      faults.add(fmt::format("bodies[{}].name", i), "\"hub\" is the body of [hub]; choose another");
+  for (size_t i = 0; i < scene.hinges.size(); ++i) check_hinge(faults, fmt::format("hinges[{}]", i), scene.hinges[i]);
+  if (body_names_known(faults, scene)) check_hinge_bodies(faults, scene);
+}
+
 void check_scene(const Scene& scene, Faults& faults) {
   check_name(faults, "name", scene.name);  // the results folder is called so
   check_times(faults, scene);
   check_integrator(faults, scene);
   if (!scene.is_tree) check_hub(faults, scene);
   if (scene.orbit) check_orbit(faults, *scene.orbit);
-  if (scene.orbit && scene.orbit->gravity != "none" && scene.hub.fixed)
+  const bool in_field = scene.orbit && scene.orbit->gravity != "none";
+  if (in_field && scene.hub.fixed)
     faults.add("orbit.gravity", "acts on bodies that fly, but hub.fixed is true; drop one of them");
+  if (in_field && !scene.gravity.isZero(0))
+    faults.add("gravity", "is uniform, and orbit.gravity is that of the Earth; drop one of them");
+  for (const JointScene& j : scene.joints)
+    if (in_field && j.a.body.empty() && j.kind != JointKind::free)
+      faults.add("orbit.gravity",
+                 fmt::format("acts on bodies that fly, but joint {} holds one in the frame of the orbit", j.name));
   for (size_t i = 0; i < scene.bodies.size(); ++i) check_body(scene.bodies[i], fmt::format("bodies[{}]", i), faults);
   for (size_t i = 0; i < scene.hinges.size(); ++i) check_hinge(faults, fmt::format("hinges[{}]", i), scene.hinges[i]);
   check_body_names(faults, scene);

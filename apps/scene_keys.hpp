@@ -74,6 +74,9 @@ struct BodyScene;
 /// Everything that can be said of the values themselves, under the key paths of a scene file or (for a body with an
 /// empty path) of a body file.
 void check_scene(const Scene&, toml_reader::Faults&);
+
+/// [hub] and [[hinges]] of a scene with joints, before they are written out as joints.
+void check_shorthand(const Scene&, toml_reader::Faults&);
 void check_body(const BodyScene&, const std::string& path, toml_reader::Faults&);
 
 /// Joints, springs, loads, wheels and gravity: reading (apps/tree_scene_reader.cpp) and checking.

@@ -112,6 +112,18 @@ void write_hinge(Writer& out, const HingeScene& scene) {
   out.key("start_rate", scene.start_rate, "rad/s");
 }
 
+void write_orbit(Writer& out, const OrbitScene& orbit) {
+  out.table("[orbit]");
+  out.key("altitude", orbit.altitude, "m, of the perigee");
+  out.key("eccentricity", orbit.eccentricity);
+  out.key("inclination", orbit.inclination, "rad");
+  out.key("node", orbit.node, "rad");
+  out.key("perigee", orbit.perigee, "rad");
+  out.key("anomaly", orbit.anomaly, "rad");
+  out.key("gravity", orbit.gravity);
+  out.key("J2", orbit.J2);
+}
+
 void write_settings(Writer& out, const Scene& scene) {
   out.key("format", scene_keys::scene_format);
   out.key("name", scene.name);
@@ -132,20 +144,20 @@ void write_settings(Writer& out, const Scene& scene) {
 
 }  // namespace
 
+std::string to_toml(const BodyScene& body) {
+  Writer out;
+  write_body(out, body);
+  return std::move(out).text();
+}
+
 std::string to_toml(const Scene& scene) {
   Writer out;
   write_settings(out, scene);
+  if (scene.orbit) write_orbit(out, *scene.orbit);
   if (scene.is_tree) {
     for (const BodyScene& body : scene.bodies) write_body(out, body);
     write_tree(out, scene);
     return std::move(out).text();
-  }
-  if (scene.orbit) {
-    out.table("[orbit]");
-    out.key("altitude", scene.orbit->altitude, "m");
-    out.key("inclination", scene.orbit->inclination, "rad");
-    out.key("gravity", scene.orbit->gravity);
-    out.key("J2", scene.orbit->J2);
   }
   out.table("[hub]");
   out.key("mass", scene.hub.mass, "kg");

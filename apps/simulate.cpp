@@ -3,12 +3,11 @@
 #include "apps/deflection.hpp"
 #include "apps/error_budget.hpp"
 #include "apps/multipliers_flight.hpp"
+#include "apps/scene_orbit.hpp"
 #include "apps/tree_flight.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
-#include "reduction/eq14.hpp"
-#include "reduction/geometric_stiffness.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -26,89 +25,6 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
-
-PreparedBody prepare_eq14(const BodyScene& b) {
-  const BeamSegment& segment = b.geometry.segments.at(0);
-  const Section s = section_of(segment.start, segment.material.nu, b.geometry.shear);
-  const eq14::Boom boom{segment.length, segment.material.rho * s.A, segment.material.E * s.Iz};
-  const bool all = b.directions == "all";
-  require(!all || b.modes % 2 == 0, fmt::format("body {}: eq. 14 has equal modes in two planes: with directions = "
-                                                "\"all\" give an even number of modes, not {}",
-                                                b.name, b.modes));
-  const int per_plane = all ? b.modes / 2 : b.modes;
-  PreparedBody r;
-  r.body = eq14::reduced_body(boom, per_plane, all ? eq14::Planes::xy_and_xz : eq14::Planes::xy, b.name);
-  return r;
-}
-
-/// Where loads act for geometric stiffness.
-std::vector<std::string> moving_markers(const ReducedBody& body, const Mesh& mesh) {
-  std::vector<std::string> names;
-  for (const Marker& m : body.markers)
-    if (mesh.node_sets.contains(m.name) && m.S.norm() > 0) names.push_back(m.name);
-  return names;
-}
-
-PreparedBody prepare_beam(const BodyScene& b, int refine) {
-  BeamGeometry geometry = b.geometry;
-  constexpr int highest = 12;
-  if (geometry.order + refine <= highest) {
-    geometry.order += refine;
-  } else {  // halve the elements instead
-    for (BeamSegment& segment : geometry.segments) segment.elements = 2 * std::max(segment.elements, 8);
-  }
-  const Mesh mesh = make_mesh(geometry);
-  const Assembly assembly = assemble(mesh);
-  const std::vector<int>& clamp = node_set(mesh, b.clamp);
-  PreparedBody r;
-  ModalBasis basis;
-  basis.Phi = MatrixXd::Zero(assembly.dofs.count, 0);
-  basis.omega = VectorXd::Zero(0);
-  if (b.structure != "rigid" && b.modes > 0) {
-    EigenOptions options;
-    options.backend = b.backend;
-    options.num_modes = b.modes;
-    const std::vector<ModeKind> kinds =
-        b.directions == "all" ? std::vector<ModeKind>{} : std::vector{ModeKind::bending_y};
-    basis = clamped_modes_of_kind(mesh, assembly, clamp, b.modes, kinds, options);
-  }
-  r.body = reduce(mesh, assembly, basis, b.name);
-  r.checks = check_invariants(r.body, mesh, assembly, basis);
-  if (!b.stiffening.empty() && r.body.n() > 0)
-    r.body.Kg = geometric_stiffness(mesh, assembly, clamp, basis.Phi, {.markers = moving_markers(r.body, mesh)});
-  r.eigen = basis.summary;
-  r.elements = static_cast<int>(mesh.elements.size());
-  r.dofs = basis.unknowns;
-  if (b.structure == "rigid") r.body.structure = "rigid";
-  return r;
-}
-
-}  // namespace
-
-PreparedBody prepare_body(const BodyScene& b, int refine) {
-  if (b.rigid) return prepare_rigid(b);
-  if (b.reduced) return prepare_reduced(b);
-  require(
-      b.structure == "eq14" || b.structure == "beam" || b.structure == "rigid",
-      fmt::format("body {}: structure '{}' is not available; there are: 'beam', 'eq14', 'rigid'", b.name, b.structure));
-  PreparedBody r = b.structure == "eq14" ? prepare_eq14(b) : prepare_beam(b, refine);
-  apply_damping(r.body, b.damping);
-  for (const BodyCheck& c : r.checks)
-    if (!c.passed)
-      throw NumericalError(fmt::format("body {}: invariant {} = {:.17g}, but {:.17g} by an independent route", b.name,
-                                       c.name, c.value, c.reference));
-  return r;
-}
-
-namespace {
-
-/// The reference point's orbit, in the axes that the hub has at t = 0: those of the LVLH frame.
-Orbit orbit_of(const Scene& scene) {
-  Planet earth;
-  if (scene.orbit->J2) earth.J2 = earth_J2;
-  const Orbit orbit(circular_orbit(scene.orbit->altitude, scene.orbit->inclination, earth), earth, scene.duration);
-  return orbit.in_axes(lvlh_frame(earth, orbit.at(0)).axes);
-}
 
 /// Where the mass centre of all bodies lies from the hub's origin, hub axes.
 Vector3d mass_centre(const System& system, const State& s) {
@@ -140,9 +56,8 @@ Flyable make_system(const Scene& scene, const std::vector<PreparedBody>& bodies)
     appendages.back().hinge.name = p.body.name;
     angles.push_back(h->start_angle);
   }
-  const bool in_field = scene.orbit && scene.orbit->gravity == "differential";
-  std::optional<OrbitalField> field;
-  if (in_field) field = OrbitalField{orbit_of(scene)};
+  std::optional<OrbitalField> field = field_of(scene);
+  const bool in_field = field.has_value();
   System system(std::move(hub), std::move(appendages), scene.hub.fixed, std::move(field));
   State start = system.at_rest(angles);
   if (in_field) start.position = -mass_centre(system, start);  // the mass centre follows the orbit
@@ -156,11 +71,6 @@ Flyable make_system(const Scene& scene, const std::vector<PreparedBody>& bodies)
 }
 
 namespace {
-
-/// Roll, pitch, yaw of the hub against the LVLH frame.
-Vector3d lvlh_angles(const Eigen::Vector4d& attitude, const Orbit& orbit, double t) {
-  return roll_pitch_yaw(lvlh_frame(orbit.planet(), orbit.at(t)).axes.transpose() * rotation_matrix(attitude));
-}
 
 void add_vector(std::vector<std::string>& names, const std::string& stem) {
   for (const char* axis : {".x", ".y", ".z"}) names.push_back(stem + axis);
@@ -417,7 +327,7 @@ std::vector<Bending> bending_of(const Run& run) {
 Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_steps) {
   const Stopwatch start;
   std::vector<PreparedBody> bodies;
-  for (const BodyScene& b : scene.bodies) bodies.push_back(prepare_body(b, refine));
+  for (const BodyScene& b : scene.bodies) bodies.push_back(prepare_body(b, refine, scene.bodies_kept_in));
   const double seconds = start.seconds();
   const auto fly = !scene.is_tree ? fly_hub : scene.formulation == "multipliers" ? fly_by_multipliers : fly_tree;
   Run r = fly(scene, std::move(bodies), hooks, max_steps);
@@ -440,9 +350,12 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
     const BodyScene& b = scene.bodies[i];
     if (!b.is_boom()) continue;
     const PreparedBody& p = run.bodies[i];
-    const std::string model = p.body.structure == "eq14" ? "eq. 14, Euler-Bernoulli line mass, closed form"
-                                                         : fmt::format("{} beam elements, order {}, {} unknowns",
-                                                                       p.elements, b.geometry.order, p.dofs);
+    const std::string model =
+        !p.kept.empty()              ? fmt::format("{} unknowns, kept in {}", p.dofs, p.kept.string())
+        : p.body.structure == "eq14" ? "eq. 14, Euler-Bernoulli line mass, closed form"
+        : b.structure == "solid"
+            ? fmt::format("{} solid elements, {} unknowns", p.elements, p.dofs)
+            : fmt::format("{} beam elements, order {}, {} unknowns", p.elements, b.geometry.order, p.dofs);
     plan.push_back(fmt::format("{}: {}; {} modes", b.name, model, p.body.n()));
     plan.push_back(fmt::format("{}: {}", b.name, damping_text(b.damping)));
   }

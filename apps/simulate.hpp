@@ -1,10 +1,10 @@
 #pragma once
 
 #include "apps/flight_state.hpp"
+#include "apps/prepared_body.hpp"
 #include "apps/scene.hpp"
 #include "dynamics/integrator.hpp"
 #include "dynamics/tree_integrator.hpp"
-#include "reduction/inertia_invariants.hpp"
 
 #include <atomic>
 #include <cstddef>
@@ -16,19 +16,6 @@
 #include <vector>
 
 namespace flexboom {
-
-/// A body of a scene made ready to fly, with what is known of its quality.
-struct PreparedBody {
-  ReducedBody body;
-  int elements = 0;
-  int dofs = 0;                   // unknowns of the model, 0 in closed form
-  std::vector<BodyCheck> checks;  // empty in closed form
-  EigenSummary eigen;
-};
-
-/// Geometry -> mesh -> K, M -> modes -> reduced body, or the closed form, as the scene says.
-/// `refine` raises the polynomial order, for error estimates. @throws InputError, NumericalError.
-PreparedBody prepare_body(const BodyScene&, int refine = 0);
 
 /// Four separate errors of a run, each relative to the outputs wanted (README of apps: what each is compared with).
 /// What was not measured is unknown (NaN), and then so is the total.

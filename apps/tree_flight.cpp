@@ -3,6 +3,7 @@
 #include "apps/tree_flight.hpp"
 
 #include "apps/scene_keys.hpp"
+#include "apps/scene_orbit.hpp"
 #include "dynamics/multibody_of.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
@@ -20,25 +21,6 @@ namespace flexboom {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-PreparedBody prepare_rigid(const BodyScene& b) {
-  const RigidScene& r = *b.rigid;
-  const Matrix3d J =
-      r.inertia + r.mass * (r.centre.squaredNorm() * Matrix3d::Identity() - r.centre * r.centre.transpose());
-  PreparedBody p;
-  p.body = rigid_body(b.name, r.mass, r.mass * r.centre, J);
-  return p;
-}
-
-PreparedBody prepare_reduced(const BodyScene& b) {
-  PreparedBody p;
-  p.body = *b.reduced;
-  p.body.name = b.name;
-  p.dofs = p.body.full_freedoms;
-  p.checks = p.body.certificate;
-  if (b.damping.name != "none") apply_damping(p.body, b.damping);  // else the file's
-  return p;
-}
 
 namespace {
 
@@ -180,6 +162,7 @@ void add_turns(const Scene& scene, Multibody& r) {
 Multibody make_multibody(const Scene& scene, const std::vector<PreparedBody>& bodies) {
   Multibody r;
   r.gravity = scene.gravity;
+  r.field = field_of(scene);
   for (const PreparedBody& p : bodies) r.bodies.push_back(p.body);
   for (const JointScene& j : scene.joints) {
     r.joints.push_back(joint_of(scene, j));
@@ -208,8 +191,33 @@ TreeState start_state(const Scene& scene, const Tree& tree) {
   return s;
 }
 
+namespace {
+
+/// Where the mass centre of all bodies lies, inertial axes.
+Vector3d mass_centre(const Tree& tree, const TreeState& state) {
+  const VectorXd y = tree.pack(state);
+  Vector3d moment = Vector3d::Zero();
+  double mass = 0;
+  for (size_t i = 0; i < tree.scene().bodies.size(); ++i) {
+    const ReducedBody& body = tree.scene().bodies[i];
+    const PlaceMotionInSpace origin = tree.motion(0, y, Place{.body = static_cast<int>(i), .marker = {}});
+    mass += body.m;
+    moment += body.m * origin.position + origin.axes * body.mc0;
+  }
+  return moment / mass;
+}
+
+}  // namespace
+
 VectorXd first_state(const Scene& scene, const Tree& tree) {
-  return scene.from ? scene.from->values(state_names(tree)) : tree.pack(start_state(scene, tree));
+  if (scene.from) return scene.from->values(state_names(tree));
+  TreeState start = start_state(scene, tree);
+  if (tree.scene().field) {  // the mass centre follows the orbit
+    const Vector3d centre = mass_centre(tree, start);
+    for (size_t i = 0; i < scene.joints.size(); ++i)
+      if (scene.joints[i].a.body.empty()) start.joints[i].position -= scene.joints[i].a.axes().transpose() * centre;
+  }
+  return tree.pack(start);
 }
 
 std::vector<std::string> joint_names(const Scene& scene) {

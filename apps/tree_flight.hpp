@@ -24,10 +24,6 @@ std::vector<std::string> joint_names(const Scene&);
 /// Where a flight of a scene with joints is.
 FlightState end_of(const Run&, const Scene&, double time, const Eigen::VectorXd& y, const IntegrationSummary&);
 
-/// The boom's, rigid or reduced body of a scene with joints, with its geometric stiffness where it has one.
-PreparedBody prepare_rigid(const BodyScene&);
-PreparedBody prepare_reduced(const BodyScene&);
-
 /// Geometric stiffness of each body: as the scene says, "auto" by what its start and prescribed motions make of it.
 std::vector<Stiffening> first_stiffening(const Scene&, const Multibody&);
 

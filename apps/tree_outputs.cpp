@@ -1,12 +1,15 @@
 // Outputs of a scene with joints: columns of trajectory.csv, lines of the plan.
 
 #include "apps/deflection.hpp"
+#include "apps/scene_orbit.hpp"
 #include "apps/tree_flight.hpp"
 #include "dynamics/rotation.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
+#include <optional>
 
 namespace flexboom {
 
@@ -70,6 +73,19 @@ std::vector<char> closed_stops(const Tree& tree, const VectorXd& y) {
   return contact;
 }
 
+/// The joint of the body whose attitude against the LVLH frame is an output.
+size_t first_that_flies(const Scene& scene) {
+  const auto flies = [](const JointScene& j) { return j.kind == JointKind::free && j.a.body.empty(); };
+  return static_cast<size_t>(std::ranges::find_if(scene.joints, flies) - scene.joints.begin());
+}
+
+/// Of the body on a free joint, BRF -> inertial.
+Eigen::Vector4d attitude_of(const JointScene& joint, const JointState& s) {
+  const Eigen::Quaterniond turn(
+      Eigen::Matrix3d(joint.a.axes() * rotation_matrix(s.attitude) * joint.b.axes().transpose()));
+  return {turn.w(), turn.x(), turn.y(), turn.z()};
+}
+
 /// Rotation vectors of the body that turns from the attitudes that the turns command, its own axes [rad].
 class Pointing {
  public:
@@ -104,6 +120,9 @@ OutputTable tree_output_table(const Scene& scene, const Tree& tree, size_t rows,
   OutputTable table;
   Columns out(table, static_cast<Eigen::Index>(rows));
   const Pointing pointing(scene);
+  const size_t flying = first_that_flies(scene);
+  std::optional<Orbit> orbit;
+  if (scene.orbit && flying < scene.joints.size()) orbit = orbit_of(scene);
   for (size_t row = 0; row < rows; ++row) {
     const TreeMoment now = moment(row);
     const TreeState& s = now.state;
@@ -121,6 +140,10 @@ OutputTable tree_output_table(const Scene& scene, const Tree& tree, size_t rows,
     }
     for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name + ".spin", s.spin[w]);
     pointing.put(out, now.time, s);
+    if (orbit) {
+      const Vector3d angles = lvlh_angles(attitude_of(scene.joints[flying], s.joints[flying]), *orbit, now.time);
+      out.put("lvlh.roll", angles.x()), out.put("lvlh.pitch", angles.y()), out.put("lvlh.yaw", angles.z());
+    }
     const TreeBalance& e = now.balance;
     out.put("energy.kinetic", e.kinetic), out.put("energy.elastic", e.elastic);
     out.put("energy.potential", e.potential), out.put("energy.dissipated", e.dissipated);

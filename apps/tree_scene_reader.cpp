@@ -229,8 +229,10 @@ bool same_but_case(std::string_view a, std::string_view b) {
       a, b, {}, [](unsigned char c) { return std::tolower(c); }, [](unsigned char c) { return std::tolower(c); });
 }
 
-/// Decks write names in capitals: a marker that is not there as written is the one that differs by case alone.
-void spell_marker(const Scene& scene, PlaceScene& place) {
+/// Decks write names in capitals: a marker that is not there as written is the one that differs by case alone. A hub
+/// that is fixed is the inertial frame.
+void look_up(const Scene& scene, PlaceScene& place) {
+  if (scene.hub.fixed && place.body == "hub") place.body.clear();
   const auto body = std::ranges::find(scene.bodies, place.body, &BodyScene::name);
   if (place.marker.empty() || body == scene.bodies.end()) return;
   const std::vector<std::string> names = marker_names(*body);
@@ -243,20 +245,15 @@ void spell_marker(const Scene& scene, PlaceScene& place) {
 
 void read_tree(TableReader& table, Scene& scene) {
   scene.is_tree = true;
-  for (const char* key : {"hub", "hinges", "initial", "orbit"})
-    if (table.has(key))
-      table.fault(key,
-                  "belongs to scenes of one hub with [[hinges]]; with [[joints]] the hub is one of the [[bodies]], "
-                  "hinges and start values are those of its joints, and there is no orbit yet");
   scene.gravity = table.vector("gravity", scene.gravity);
   for (TableReader& joint : table.tables("joints")) scene.joints.push_back(read_joint(joint));
   for (TableReader& spring : table.tables("springs")) scene.springs.push_back(read_spring(spring));
   for (TableReader& load : table.tables("loads")) scene.loads.push_back(read_load(load));
   for (TableReader& wheel : table.tables("wheels")) scene.wheels.push_back(read_wheel(wheel));
   for (TableReader& turn : table.tables("turns")) scene.turns.push_back(read_turn(turn));
-  for (JointScene& j : scene.joints) spell_marker(scene, j.a), spell_marker(scene, j.b);
-  for (SpringScene& s : scene.springs) spell_marker(scene, s.a), spell_marker(scene, s.b);
-  for (LoadScene& l : scene.loads) spell_marker(scene, l.at);
+  for (JointScene& j : scene.joints) look_up(scene, j.a), look_up(scene, j.b);
+  for (SpringScene& s : scene.springs) look_up(scene, s.a), look_up(scene, s.b);
+  for (LoadScene& l : scene.loads) look_up(scene, l.at);
 }
 
 }  // namespace flexboom

@@ -176,7 +176,6 @@ class BadInput(Case):
         self.assert_run_refused("--modes", "1000", "--structure", "beam", words="modes")
 
     def test_choices_of_other_versions(self):
-        self.assert_run_refused("--structure", "solid", words="solid")
         self.assert_run_refused("--formulation", "multipliers", "--integrator", "bdf", words="integrator.method")
         self.assert_run_refused("--formulation", "redundant", words="multipliers")
 

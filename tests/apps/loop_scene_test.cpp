@@ -149,6 +149,8 @@ TEST(LoopScene, WhatMultipliersCannotDoIsRefusedWithItsPlace) {
   Scene sport = load_scene("sport");
   sport.formulation = "multipliers";
   sport.orbit->gravity = "differential";
+  EXPECT_NO_THROW(validate(sport));
+  sport.rescale_at_events = true;
   EXPECT_THROW(validate(sport), InputError);
 }
 

@@ -201,10 +201,7 @@ TEST(Scene, ValidateFindsWhatAnOverrideBreaks) {
   };
   EXPECT_EQ(broken([](Scene&) {}), "");
   EXPECT_EQ(broken([](Scene& s) { s.duration = -1; }), "duration: is -1 s; it must be positive");
-  EXPECT_EQ(
-      broken([](Scene& s) { s.bodies[1].structure = "solid"; }),
-      "bodies[1].structure: \"solid\" has modes and a mesh but does not fly in this version; in a scene it must be "
-      "\"beam\", \"eq14\" or \"rigid\"");
+  EXPECT_EQ(broken([](Scene& s) { s.bodies[1].structure = "solid"; }), "");
   EXPECT_NE(broken([](Scene& s) { s.bodies[1].modes = 5000; }).find("bodies[1].modes: is 5000, but the mesh has only"),
             std::string::npos);
   EXPECT_NE(broken([](Scene& s) { s.integrator = "bfd"; }).find("did you mean \"bdf\"?"), std::string::npos);

@@ -41,7 +41,7 @@ TEST(LoopScenes, SportFliesByMultipliersAsInRelativeCoordinates) {
   ASSERT_GT(found.size(), 10u);
   for (size_t i = 0; i < found.size(); ++i) {
     EXPECT_NEAR(found[i].time, wanted[i].time, 1e-7) << i;
-    EXPECT_EQ(found[i].hinge, wanted[i].hinge) << i;
+    EXPECT_EQ(found[i].joint, wanted[i].joint) << i;
     EXPECT_EQ(found[i].contact, wanted[i].contact) << i;
   }
   EXPECT_LT(redundant.trajectory.summary.constraint_drift, 1e-12);

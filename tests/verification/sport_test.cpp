@@ -97,7 +97,7 @@ TEST(PaperFigures, HubTurnsMostAboutX1DrivenBySip) {
   const auto without = [](const std::string& boom) {       // that boom starts deployed and at rest
     Scene scene = sport("beam");
     scene.duration = 1;
-    for (HingeScene& h : scene.joints)
+    for (HingeScene& h : scene.hinges)
       if (h.body == boom) h.start_angle = pi / 2;
     return hub_rotation(run_scene(scene, {}));
   };
@@ -240,7 +240,7 @@ Scene conservative(double duration) {
   scene.tolerance = 1e-10;
   scene.duration = duration;
   for (BodyScene& b : scene.bodies) b.damping = {};
-  for (HingeScene& h : scene.joints) h.hinge.mechanism.damping = 0;
+  for (HingeScene& h : scene.hinges) h.hinge.mechanism.damping = 0;
   return scene;
 }
 

@@ -1,0 +1,174 @@
+// Bodies of a scene: from what the file says to a reduced body.
+
+#include "apps/prepared_body.hpp"
+
+#include "apps/version.hpp"
+#include "fem/assembly.hpp"
+#include "fem/check.hpp"
+#include "fem/solid_boom.hpp"
+#include "reduction/body_file.hpp"
+#include "reduction/eq14.hpp"
+#include "reduction/geometric_stiffness.hpp"
+#include "reduction/modal_basis.hpp"
+#include "reduction/sha256.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+PreparedBody prepare_rigid(const BodyScene& b) {
+  const RigidScene& r = *b.rigid;
+  const Matrix3d J =
+      r.inertia + r.mass * (r.centre.squaredNorm() * Matrix3d::Identity() - r.centre * r.centre.transpose());
+  PreparedBody p;
+  p.body = rigid_body(b.name, r.mass, r.mass * r.centre, J);
+  return p;
+}
+
+PreparedBody prepare_reduced(const BodyScene& b) {
+  PreparedBody p;
+  p.body = *b.reduced;
+  p.body.name = b.name;
+  p.dofs = p.body.full_freedoms;
+  p.checks = p.body.certificate;
+  if (b.damping.name != "none") apply_damping(p.body, b.damping);  // else the file's
+  return p;
+}
+
+PreparedBody prepare_eq14(const BodyScene& b) {
+  const BeamSegment& segment = b.geometry.segments.at(0);
+  const Section s = section_of(segment.start, segment.material.nu, b.geometry.shear);
+  const eq14::Boom boom{segment.length, segment.material.rho * s.A, segment.material.E * s.Iz};
+  const bool all = b.directions == "all";
+  require(!all || b.modes % 2 == 0, fmt::format("body {}: eq. 14 has equal modes in two planes: with directions = "
+                                                "\"all\" give an even number of modes, not {}",
+                                                b.name, b.modes));
+  const int per_plane = all ? b.modes / 2 : b.modes;
+  PreparedBody r;
+  r.body = eq14::reduced_body(boom, per_plane, all ? eq14::Planes::xy_and_xz : eq14::Planes::xy, b.name);
+  return r;
+}
+
+/// Where loads act for geometric stiffness.
+std::vector<std::string> moving_markers(const ReducedBody& body, const Mesh& mesh) {
+  std::vector<std::string> names;
+  for (const Marker& m : body.markers)
+    if (mesh.node_sets.contains(m.name) && m.S.norm() > 0) names.push_back(m.name);
+  return names;
+}
+
+/// Elements of a boom: `refine` raises their order, or where that is the highest makes them smaller.
+Mesh beam_mesh(BeamGeometry geometry, int refine) {
+  constexpr int highest = 12;
+  if (geometry.order + refine <= highest) {
+    geometry.order += refine;
+  } else {
+    for (BeamSegment& segment : geometry.segments) segment.elements = 2 * std::max(segment.elements, 8);
+  }
+  return make_mesh(geometry);
+}
+
+Mesh solid_mesh(const BodyScene& b, int refine) {
+  SolidOptions options = chosen(b.geometry, b.solid);
+  constexpr int highest = 8;
+  require(refine == 0 || options.element == "hex",
+          fmt::format("body {}: elements {} have no higher order to be compared with; use \"hex\"", b.name,
+                      options.element));
+  options.order = std::min(options.order + refine, highest);
+  return make_solid_mesh(b.geometry, options);
+}
+
+PreparedBody prepare_model(const BodyScene& b, int refine) {
+  const Mesh mesh = b.structure == "solid" ? solid_mesh(b, refine) : beam_mesh(b.geometry, refine);
+  const Assembly assembly = assemble(mesh);
+  const std::vector<int>& clamp = node_set(mesh, b.clamp);
+  PreparedBody r;
+  ModalBasis basis;
+  basis.Phi = MatrixXd::Zero(assembly.dofs.count, 0);
+  basis.omega = VectorXd::Zero(0);
+  if (b.structure != "rigid" && b.modes > 0) {
+    EigenOptions options;
+    options.backend = b.backend;
+    options.num_modes = b.modes;
+    const std::vector<ModeKind> kinds =
+        b.directions == "all" ? std::vector<ModeKind>{} : std::vector{ModeKind::bending_y};
+    basis = clamped_modes_of_kind(mesh, assembly, clamp, b.modes, kinds, options);
+  }
+  r.body = reduce(mesh, assembly, basis, b.name);
+  r.checks = check_invariants(r.body, mesh, assembly, basis);
+  if (!b.stiffening.empty() && r.body.n() > 0)
+    r.body.Kg = geometric_stiffness(mesh, assembly, clamp, basis.Phi, {.markers = moving_markers(r.body, mesh)});
+  r.eigen = basis.summary;
+  r.elements = static_cast<int>(mesh.elements.size());
+  r.dofs = basis.unknowns;
+  if (b.structure == "rigid") r.body.structure = "rigid";
+  return r;
+}
+
+/// Where a body is kept: its name, and a digest of all that it is made of.
+std::filesystem::path kept_file(const BodyScene& b, int refine, const std::filesystem::path& keep) {
+  const std::string made_of = fmt::format("{}\nrefined {}\nflexboom {}\n", to_toml(b), refine, version);
+  return keep / fmt::format("{}-{}.h5", b.name, sha256(made_of).substr(0, 16));
+}
+
+std::optional<PreparedBody> read_kept(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return {};
+  PreparedBody p;
+  try {
+    p.body = read_body_file(file);
+  } catch (const InputError&) {
+    return {};  // cut off or changed: it is made anew
+  }
+  p.kept = file;
+  p.dofs = p.body.full_freedoms;
+  p.checks = p.body.certificate;
+  return p;
+}
+
+/// Best effort: a folder that cannot be written costs the next run its time, not this one.
+void write_kept(const std::filesystem::path& file, PreparedBody& p) {
+  std::error_code error;
+  std::filesystem::create_directories(file.parent_path(), error);
+  ReducedBody body = p.body;
+  body.certificate = p.checks;
+  try {
+    write_body_file(file, body);
+  } catch (const InputError&) {
+    return;
+  }
+}
+
+}  // namespace
+
+PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem::path& keep) {
+  if (b.rigid) return prepare_rigid(b);
+  if (b.reduced) return prepare_reduced(b);
+  require(b.structure == "eq14" || b.structure == "beam" || b.structure == "solid" || b.structure == "rigid",
+          fmt::format("body {}: structure '{}' is not available; there are: 'beam', 'solid', 'eq14', 'rigid'", b.name,
+                      b.structure));
+  const std::filesystem::path file =
+      b.structure == "solid" && !keep.empty() ? kept_file(b, refine, keep) : std::filesystem::path();
+  if (!file.empty())
+    if (std::optional<PreparedBody> kept = read_kept(file)) return *kept;
+  PreparedBody r = b.structure == "eq14" ? prepare_eq14(b) : prepare_model(b, refine);
+  apply_damping(r.body, b.damping);
+  for (const BodyCheck& c : r.checks)
+    if (!c.passed)
+      throw NumericalError(fmt::format("body {}: invariant {} = {:.17g}, but {:.17g} by an independent route", b.name,
+                                       c.name, c.value, c.reference));
+  if (!file.empty()) write_kept(file, r);
+  return r;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,27 @@
+#pragma once
+
+#include "apps/scene.hpp"
+#include "reduction/eigen_solver.hpp"
+#include "reduction/inertia_invariants.hpp"
+
+#include <filesystem>
+#include <vector>
+
+namespace flexboom {
+
+/// A body of a scene made ready to fly, with what is known of its quality.
+struct PreparedBody {
+  ReducedBody body;
+  int elements = 0;
+  int dofs = 0;                   // unknowns of the model, 0 in closed form
+  std::vector<BodyCheck> checks;  // empty in closed form
+  EigenSummary eigen;
+  std::filesystem::path kept;  // the file that it was read from, made by an earlier run; empty: made now
+};
+
+/// Geometry -> mesh -> K, M -> modes -> reduced body, or the closed form, or the body that the scene gives.
+/// `refine` raises the polynomial order, for error estimates. A solid body is kept in the folder `keep`, if one is
+/// given, and read from there as long as what it is made of is the same. @throws InputError, NumericalError.
+PreparedBody prepare_body(const BodyScene&, int refine = 0, const std::filesystem::path& keep = {});
+
+}  // namespace flexboom
