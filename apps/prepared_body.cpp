@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace flexboom {
 
@@ -35,12 +36,18 @@ PreparedBody prepare_rigid(const BodyScene& b) {
   return p;
 }
 
-PreparedBody prepare_reduced(const BodyScene& b) {
+/// As a file has it.
+PreparedBody prepared(ReducedBody body) {
   PreparedBody p;
-  p.body = *b.reduced;
-  p.body.name = b.name;
+  p.body = std::move(body);
   p.dofs = p.body.full_freedoms;
   p.checks = p.body.certificate;
+  return p;
+}
+
+PreparedBody prepare_reduced(const BodyScene& b) {
+  PreparedBody p = prepared(*b.reduced);
+  p.body.name = b.name;
   if (b.damping.name != "none") apply_damping(p.body, b.damping);  // else the file's
   return p;
 }
@@ -124,20 +131,17 @@ std::filesystem::path kept_file(const BodyScene& b, int refine, const std::files
 std::optional<PreparedBody> read_kept(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) return {};
-  PreparedBody p;
   try {
-    p.body = read_body_file(file);
+    PreparedBody p = prepared(read_body_file(file));
+    p.kept = file;
+    return p;
   } catch (const InputError&) {
     return {};  // cut off or changed: it is made anew
   }
-  p.kept = file;
-  p.dofs = p.body.full_freedoms;
-  p.checks = p.body.certificate;
-  return p;
 }
 
 /// Best effort: a folder that cannot be written costs the next run its time, not this one.
-void write_kept(const std::filesystem::path& file, PreparedBody& p) {
+void write_kept(const std::filesystem::path& file, const PreparedBody& p) {
   std::error_code error;
   std::filesystem::create_directories(file.parent_path(), error);
   ReducedBody body = p.body;

@@ -191,8 +191,8 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   }
 
   void step(double limit, double& t, VectorXd& y) override {
-    std::vector<Clearance> before;
-    for (size_t i = 0; i < contacts_.size(); ++i) before.push_back(clearance(i, y));
+    before_.resize(contacts_.size());
+    for (size_t i = 0; i < contacts_.size(); ++i) before_[i] = clearance(i, y);
     const double t0 = t;
     std::vector<int>& crossed = contacts_.crossed();
     try {
@@ -203,7 +203,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       if (!body.empty()) throw NumericalError(fmt::format("t = {:.9g} s: {}", t, body));
       throw;
     }
-    if (std::ranges::all_of(crossed, [](int c) { return c == 0; })) find_short_contacts(t0, before, t, y);
+    if (std::ranges::all_of(crossed, [](int c) { return c == 0; })) find_short_contacts(t0, t, y);
     // Only a crossing away from where the flag is counts: the state may lie a rounding error behind the stop.
     for (size_t i = 0; i < contacts_.size(); ++i) {
       const double rate = gap(i, y.data()).rate;
@@ -245,12 +245,12 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   }
 
   /// IDA looks at the signs at both ends of a step: a contact that begins and ends within it is found here.
-  void find_short_contacts(double t0, const std::vector<Clearance>& before, double& t, VectorXd& y) {
+  void find_short_contacts(double t0, double& t, VectorXd& y) {
     const double length = t - t0;
     double first = length;
     std::vector<int>& crossed = contacts_.crossed();
     for (size_t i = 0; i < contacts_.size(); ++i) {
-      if (!contacts_.armed()[i] || !(before[i].slope < 0)) continue;
+      if (!contacts_.armed()[i] || !(before_[i].slope < 0)) continue;
       Clearance to = clearance(i, y);
       to.c = length;
       if (!(to.slope > 0) || to.value < 0) continue;
@@ -261,7 +261,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
         here.c = c;
         return here;
       };
-      const double root = crossing_between(at, before[i], to, 4e-16 * t);
+      const double root = crossing_between(at, before_[i], to, 4e-16 * t);
       // At round-off of the gap it may be no crossing to those who look at the rate: then the step ends where it ended,
       // for the next one starts there.
       if (root >= first || !(at(root).slope < 0)) continue;
@@ -325,6 +325,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   const MultipliersOptions& options_;
   double margin_ = 1;
   JointMemory memory_;
+  std::vector<Clearance> before_;  // of the stops, before the step
   VectorXd y_dot_, sample_, rows_, rates_;
   redundant::PatternSum assembly_;
   std::unique_ptr<FlightFrame> frame_;
