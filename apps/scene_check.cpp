@@ -80,7 +80,7 @@ void check_integrator(Faults& faults, const Scene& scene) {
   std::vector<std::string_view> methods = {"auto"};
   if (redundant) methods.push_back("ida");
   for (const IntegratorMethod& m : integrator_methods())
-    if (!redundant && (!scene.is_tree || m.make != nullptr)) methods.push_back(m.name);
+    if (!redundant) methods.push_back(m.name);
   check_name_among(faults, "integrator.method", scene.integrator, methods);
   if (redundant) check_multipliers(scene, faults);
   if (!(std::isfinite(scene.settle) && scene.settle < 1)) {

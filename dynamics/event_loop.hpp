@@ -6,7 +6,9 @@
 
 #include <fmt/format.h>
 
+#include <span>
 #include <utility>
+#include <vector>
 
 namespace flexboom {
 
@@ -47,8 +49,8 @@ class Flight : protected StopMotion {
   /// One step to t and y, not beyond `limit`, and what contacts_.crossed() it ended at. Where it throws, t_ and y_
   /// stay.
   virtual void step(double limit, double& t, Eigen::VectorXd& y) = 0;
-  /// y within the last step.
-  virtual void interpolate(double t, Eigen::VectorXd& y) = 0;
+  /// States within the last step, a column each; Y may have more columns.
+  virtual void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) = 0;
   /// Adds a row to the result.
   virtual void record(double t, Eigen::VectorXd y) = 0;
   /// Forgets all rows but the first.
@@ -57,15 +59,6 @@ class Flight : protected StopMotion {
   virtual void finish() = 0;
   /// The state that a step arrived at: what errors are weighed by.
   virtual void observe(const Eigen::VectorXd& y) = 0;
-
-  /// Outputs up to t_.
-  virtual void write_outputs() {
-    for (double next = output_time(); next <= t_ && !stopped(); next = output_time()) {
-      Eigen::VectorXd sample = y_;
-      if (next < t_) interpolate(next, sample);
-      record(next, std::move(sample));
-    }
-  }
 
   double output_time() const { return outputs_.after(result_.time.size()); }
 
@@ -102,6 +95,25 @@ class Flight : protected StopMotion {
       ++result_.summary.restarts;
     }
     if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
+  }
+
+  /// Outputs up to t_: those within the step as many at a time as go at once.
+  void write_outputs() {
+    constexpr std::size_t at_once = 16;
+    samples_.resize(y_.size(), at_once);
+    for (;;) {
+      times_.clear();
+      double next = output_time();
+      for (; times_.size() < at_once && next < t_; next = outputs_.after(result_.time.size() + times_.size()))
+        times_.push_back(next);
+      if (times_.empty() || stopped()) break;
+      interpolate(times_, samples_);
+      for (std::size_t i = 0; i < times_.size(); ++i) {
+        if (options_.progress && result_.time.size() % 1024 == 0) options_.progress(times_[i], options_.duration);
+        record(times_[i], samples_.col(static_cast<Eigen::Index>(i)));
+      }
+    }
+    if (output_time() == t_ && !stopped()) record(t_, y_);
   }
 
   /// Where the next step must end at the latest. What is nearer than round-off is reached.
@@ -147,6 +159,8 @@ class Flight : protected StopMotion {
   CheckpointClock clock_;
   Stopwatch watch_;
   Eigen::VectorXd next_y_;
+  std::vector<double> times_;  // of outputs within a step, and their states
+  Eigen::MatrixXd samples_;
   long steps_ = 0;
 };
 

@@ -1,10 +1,9 @@
 #include "dynamics/exponential.hpp"
 
-#include "dynamics/hub_motion.hpp"
+#include "dynamics/followers.hpp"
 #include "dynamics/linear_part.hpp"
 #include "dynamics/small_product.hpp"
 #include "dynamics/stop_search.hpp"
-#include "dynamics/workspace.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
@@ -25,20 +24,20 @@ using Eigen::VectorXd;
 
 constexpr int max_sweeps = 12;
 constexpr double rung = 1.4142135623730951;  // between step sizes
+constexpr double near_by = 0.3;              // joints this near to where L was taken hardly change it [rad] or [m]
 
 /// The nearest of the step sizes that grids are kept for.
 double on_ladder(double h) { return std::exp2(std::round(2 * std::log2(h)) / 2); }
 
 class ExponentialStepper final : public Stepper {
  public:
-  ExponentialStepper(const System& system, const ErrorScale& scale)
-      : system_(system),
-        layout_(system.layout()),
+  ExponentialStepper(std::unique_ptr<SplitProblem> problem, const ErrorScale& scale)
+      : problem_(std::move(problem)),
+        layout_(problem_->layout()),
         scale_(scale),
-        work_(system.workspace()),
-        nx_(layout_.p + layout_.u),
-        motion_(system, scale, *work_),
-        search_(layout_),
+        nx_(layout_.x),
+        motion_(*problem_, scale),
+        search_(layout_.gaps),
         y_(VectorXd::Zero(layout_.size)),
         y_dot_(layout_.size),
         F_(nx_, points),
@@ -49,12 +48,14 @@ class ExponentialStepper final : public Stepper {
       middle_[m] = collocation::middle_polynomial()[m] * factorial;
     }
     step_.X.resize(nx_, points);
-    for (int i = 0; i < layout_.base; ++i) watched_.push_back(layout_.p + i);
-    for (const int gap : layout_.body)
-      for (const int entry : {gap, layout_.p + layout_.base + gap}) watched_.push_back(entry);
+    for (const SplitLayout::Turn& turn : layout_.turns) {
+      for (int i = 0; i < 3; ++i) watched_.push_back(turn.omega + i);
+      y_[turn.attitude] = 1;
+    }
+    for (const auto& [gap, rate] : layout_.gaps)
+      for (const int entry : {gap, rate}) watched_.push_back(entry);
     watched_x_.resize(std::ssize(watched_), inner);
     x_at_end_.resize(nx_, 2);
-    if (!system.fixed_hub()) y_[layout_.attitude()] = 1;
     if (!(scale.tolerance > 4e-16))
       throw NumericalError(fmt::format(
           "exponential: the tolerance asks for {:.2g} of each step, which is below round-off", scale.tolerance));
@@ -65,7 +66,7 @@ class ExponentialStepper final : public Stepper {
     pending_ = false;
     contact_.assign(contact.begin(), contact.end());
     armed_.assign(armed.begin(), armed.end());
-    step_.linear = &linear_part();
+    step_.linear = &linear_part(y);
     begin(y);
     first_ = true;
     h_ = first_step();
@@ -110,7 +111,7 @@ class ExponentialStepper final : public Stepper {
     }
     t = step_.start + end_ * step_.length;
     if (end_ == 1 && step_.length == t_end - step_.start) t = t_end;
-    kept_ = motion_.keep_momentum(y);
+    kept_ = motion_.keep_momentum(t, y);
     motion_.place(step_, end_, y);
     pending_ = true;
     reached_ = t;
@@ -160,43 +161,67 @@ class ExponentialStepper final : public Stepper {
   static constexpr int points = collocation::points;
   static constexpr int inner = points - 2;
 
-  /// The linear part for the stops that are closed, made when first met.
-  LinearPart& linear_part() {
+  /// The linear part for the stops that are closed, near the joints' coordinates of y: made when first met.
+  LinearPart& linear_part(const VectorXd& y) {
     auto& place = linear_parts_[contact_];
-    if (!place) place = make_linear_part(VectorXd::Zero(layout_.p));
+    if (!place || !serves(*place, y)) place = make_linear_part(base_at(y));
     return *place;
   }
 
-  std::unique_ptr<LinearPart> make_linear_part(const VectorXd& p) {
-    VectorXd y = VectorXd::Zero(layout_.size);
-    y.head(layout_.p) = p;
-    if (!system_.fixed_hub()) y[layout_.attitude()] = 1;
-    system_.jacobian(y.data(), contact_, *work_);
+  /// At rest, undeformed, joints where they are; on their thresholds where they are near: what belongs to different
+  /// stops belongs to the same place then.
+  VectorXd base_at(const VectorXd& y) const {
+    VectorXd base = y;
+    base.head(nx_).setZero();
+    for (const int i : layout_.joints)
+      if (std::abs(y[i]) > near_by) base[i] = y[i];
+    for (const int i : layout_.spins) base[i] = y[i];
+    return base;
+  }
+
+  bool serves(const LinearPart& part, const VectorXd& y) const {
+    const auto far = [&](int i) { return !(std::abs(part.base[i] - y[i]) <= near_by); };
+    return std::ranges::none_of(layout_.joints, far) &&
+           std::ranges::none_of(layout_.turns, [&](const SplitLayout::Turn& turn) {
+             const auto here = y.segment<4>(turn.attitude), there = part.base.segment<4>(turn.attitude);
+             return layout_.attitudes_matter && 2 * std::acos(std::min(1.0, std::abs(here.dot(there)))) > near_by;
+           });
+  }
+
+  std::unique_ptr<LinearPart> make_linear_part(const VectorXd& base) {
+    MatrixXd J = problem_->linear(step_.start, base.data(), contact_);
     ++counts_.jacobian_evaluations;
     ++counts_.factorisations;
-    MatrixXd J = MatrixXd::Zero(nx_, nx_);
-    J.block(0, layout_.p + layout_.base, layout_.p, layout_.p).setIdentity();
-    J.bottomRows(layout_.u) = work_->dudot;
+    for (const int i : layout_.prescribed) J.row(i).setZero(), J.col(i).setZero();
     // A coordinate that nothing pulls back (a hinge without a spring) has no two eigenvectors of its own. With a period
     // of two hours in L it has; the remainder takes the difference.
     constexpr double pull = 1e-6;
-    for (int i = 0; i < layout_.p; ++i)
-      if (J.col(i).cwiseAbs().maxCoeff() < pull) J(layout_.p + layout_.base + i, i) -= pull;
-    if (p.isZero(0))
-      if (const auto [other, hinge] = neighbour(); other != nullptr) {
-        try {
-          return std::make_unique<LinearPart>(*other, J, layout_.body[hinge]);
-        } catch (const NumericalError&) {
-          // The block alone has no full set of eigenvectors, or two in one place; all of L may do.
-        }
+    for (const auto& [value, rate] : layout_.coordinates)
+      if (J.col(value).cwiseAbs().maxCoeff() < pull) J(rate, value) -= pull;
+    if (const auto [other, stop] = neighbour(base); other != nullptr) {
+      const int column = layout_.gaps[stop].value;
+      MatrixXd change = J - other->L;
+      change.col(column).setZero();
+      try {
+        if (change.isZero(0)) return std::make_unique<LinearPart>(*other, J, column);
+      } catch (const NumericalError&) {
+        // The block alone has no full set of eigenvectors, or two in one place; all of L may do.
       }
-    return std::make_unique<LinearPart>(std::move(J), system_.fixed_hub() ? -1 : layout_.p, p);
+    }
+    std::vector<int> omegas;
+    for (const SplitLayout::Turn& turn : layout_.turns) omegas.push_back(turn.omega);
+    try {
+      return std::make_unique<LinearPart>(J, omegas, base);
+    } catch (const NumericalError&) {  // several that are pulled by each other alone
+      for (const auto& [value, rate] : layout_.coordinates) J(rate, value) -= pull;
+      return std::make_unique<LinearPart>(std::move(J), omegas, base);
+    }
   }
 
-  /// A linear part at rest that differs in one stop, and which.
-  std::pair<const LinearPart*, size_t> neighbour() const {
+  /// A linear part at the same place that differs in one stop, and which.
+  std::pair<const LinearPart*, size_t> neighbour(const VectorXd& base) const {
     for (const auto& [contact, part] : linear_parts_) {
-      if (!part || !part->base.isZero(0)) continue;
+      if (!part || part->base.head(nx_) != base.head(nx_)) continue;
       const auto [here, there] = std::ranges::mismatch(contact_, contact);
       if (here != contact_.end() && std::equal(here + 1, contact_.end(), there + 1))
         return {part.get(), static_cast<size_t>(here - contact_.begin())};
@@ -204,11 +229,14 @@ class ExponentialStepper final : public Stepper {
     return {};
   }
 
-  /// Takes L where the step starts, unless it was taken near there (a part of p): that costs as much as some steps.
+  /// Takes L where the step starts, unless it was taken near there: that costs as much as some steps.
   void relinearise(double near) {
-    const VectorXd p = start_.head(layout_.p);
-    if ((step_.linear->base - p).norm() <= near * std::max(step_.linear->base.norm(), p.norm())) return;
-    linear_parts_[contact_] = make_linear_part(p);
+    VectorXd base = start_;
+    for (const auto& [value, rate] : layout_.coordinates) base[rate] = 0;
+    for (const SplitLayout::Turn& turn : layout_.turns) base.segment<3>(turn.omega).setZero();
+    const auto there = step_.linear->base.head(nx_), here = base.head(nx_);
+    if ((there - here).norm() <= near * std::max(there.norm(), here.norm())) return;
+    linear_parts_[contact_] = make_linear_part(base);
     step_.linear = linear_parts_[contact_].get();
     begin(start_);
     first_ = true;
@@ -237,7 +265,7 @@ class ExponentialStepper final : public Stepper {
       step_.linear->watched_modes = step_.linear->from_modes(watched_, Eigen::all);
     step_.linear->to_z(y.head(nx_), step_.Z.leftCols(1));
     step_.X.col(0) = y.head(nx_);
-    motion_.start(y);
+    motion_.start(step_.start, y);
     evaluate(0);
     step_.linear->remainder(F_.leftCols(1), step_.Z.leftCols(1), step_.N.leftCols(1));
   }
@@ -252,7 +280,7 @@ class ExponentialStepper final : public Stepper {
     step_.Z.col(0) = step_.Z.col(degree).eval();
     step_.X.col(0) = reached_state_.head(nx_);
     step_.N.col(0) = step_.N.col(degree).eval();
-    if (!kept_.isZero(0)) step_.Z.col(0) += step_.linear->to_modes.middleCols<3>(layout_.p) * kept_;
+    if (!kept_.isZero(0)) step_.Z.col(0) += step_.linear->to_modes.middleCols<3>(layout_.roots.front().omega) * kept_;
     first_ = false;
   }
 
@@ -260,16 +288,17 @@ class ExponentialStepper final : public Stepper {
   void evaluate(int j) {
     const double c = collocation::node(j);
     y_.head(nx_) = step_.X.col(j);
-    if (system_.field() && j == 0) y_ = start_;
-    if (system_.field() && j > 0) {
+    if (layout_.attitudes_matter && j == 0) y_ = start_;
+    if (layout_.attitudes_matter && j > 0) {
       motion_.turn(step_, (*step_.grid)[static_cast<size_t>(j)], c, y_);
       motion_.place(step_, c, y_);
     }
     const double t = j == 0 ? step_.start : step_.start + c * step_.length;
-    system_.derivative(t, y_.data(), contact_, *work_, y_dot_.data());
+    problem_->derivative(t, y_.data(), contact_, y_dot_.data());
     ++counts_.rhs_evaluations;
     F_.col(j) = y_dot_.head(nx_);
-    motion_.take(j, y_dot_[layout_.dissipated()], t, y_);
+    for (const int i : layout_.prescribed) F_(i, j) = 0;
+    motion_.take(j, t, y_, y_dot_);
   }
 
   /// Sweeps until the points stand still; returns the error in units of the one allowed, infinite when they do not.
@@ -299,7 +328,7 @@ class ExponentialStepper final : public Stepper {
       if (sweep + 1 == max_sweeps) return std::numeric_limits<double>::infinity();
       last_change = change;
       if (sweep > 0) step_.linear->to_x(step_.Z.middleCols<inner>(1), step_.X.middleCols<inner>(1));
-      if (system_.field()) motion_.follow(step_);  // gravity depends on attitude and place
+      if (layout_.attitudes_matter) motion_.follow(step_);
       for (int j = 1; j < points; ++j) evaluate(j);
       step_.linear->remainder(F_.rightCols(degree), step_.Z.rightCols(degree), step_.N.rightCols(degree));
     }
@@ -349,16 +378,15 @@ class ExponentialStepper final : public Stepper {
     return on_ladder(h);
   }
 
-  const System& system_;
-  const Layout& layout_;
+  std::unique_ptr<SplitProblem> problem_;
+  const SplitLayout& layout_;
   const ErrorScale& scale_;
-  WorkspaceHandle work_;
   int nx_;
   std::vector<char> contact_, armed_;
-  std::vector<int> watched_;  // entries of x that are wanted at every point: omega, gaps and their rates
+  std::vector<int> watched_;  // entries of x that are wanted at every point: angular velocities, gaps and their rates
   std::map<std::vector<char>, std::unique_ptr<LinearPart>> linear_parts_;
   CollocatedStep step_;
-  HubMotion motion_;
+  Followers motion_;
   StopSearch search_;
   Grid spare_;
   GridPoint scratch_;
@@ -378,8 +406,8 @@ class ExponentialStepper final : public Stepper {
 
 }  // namespace
 
-std::unique_ptr<Stepper> make_exponential(const System& system, const ErrorScale& scale) {
-  return std::make_unique<ExponentialStepper>(system, scale);
+std::unique_ptr<Stepper> make_exponential(std::unique_ptr<SplitProblem> problem, const ErrorScale& scale) {
+  return std::make_unique<ExponentialStepper>(std::move(problem), scale);
 }
 
 }  // namespace flexboom

@@ -5,6 +5,7 @@
 #include "dynamics/cvode.hpp"
 #include "dynamics/event_loop.hpp"
 #include "dynamics/exponential.hpp"
+#include "dynamics/ode.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
 
@@ -185,10 +186,8 @@ class SystemFlight final : public Flight<Trajectory> {
         system_(system),
         method_(method),
         scales_(system, y0, method.local_share * options.tolerance, options.rescale_at_events),
-        stepper_(method.make_of_system ? method.make_of_system(system, scales_.error())
-                                       : method.make(ode_of(system), scales_.error())),
+        stepper_(make_stepper(method, system, scales_.error())),
         y_dot_(y0.size()),
-        samples_(y0.size(), 16),
         work_(system.workspace()) {
     y_ = y0;
     contacts_.begin(*this);
@@ -218,7 +217,7 @@ class SystemFlight final : public Flight<Trajectory> {
   double noise(size_t stop) const override {
     const ErrorScale& error = scales_.error();
     const double of_steps = noise_of_methods * error.tolerance * error.scale[system_.layout().body[stop]];
-    return method_.make_of_system != nullptr ? std::min(of_steps, 1e-14 * contacts_.largest_gap(stop)) : of_steps;
+    return method_.make_split != nullptr ? std::min(of_steps, 1e-14 * contacts_.largest_gap(stop)) : of_steps;
   }
 
   void put_on_stop(size_t stop) override { y_[system_.layout().body[stop]] = 0; }
@@ -233,30 +232,9 @@ class SystemFlight final : public Flight<Trajectory> {
   }
 
   void step(double limit, double& t, VectorXd& y) override { stepper_->step(limit, t, y, contacts_.crossed()); }
-  void interpolate(double t, VectorXd& y) override { stepper_->interpolate(t, y); }
+  void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override { stepper_->interpolate_all(times, Y); }
   void observe(const VectorXd& y) override { scales_.observe(y); }
   void keep_rows(size_t rows) override { result_.y.resize(rows), result_.balance.resize(rows); }
-
-  void write_outputs() override {
-    for (outputs_within_step(); !times_.empty() && !stopped(); outputs_within_step()) {
-      stepper_->interpolate_all(times_, samples_);
-      for (size_t i = 0; i < times_.size(); ++i) {
-        if (options_.progress && result_.time.size() % 1024 == 0) options_.progress(times_[i], options_.duration);
-        record(times_[i], samples_.col(static_cast<Eigen::Index>(i)));
-      }
-    }
-    if (output_time() == t_ && !stopped()) record(t_, y_);
-  }
-
-  /// The next ones before its end, as many as go at once.
-  void outputs_within_step() {
-    times_.clear();
-    for (Eigen::Index i = 0; i < samples_.cols(); ++i) {
-      const double next = outputs_.after(result_.time.size() + times_.size());
-      if (!(next < t_)) break;
-      times_.push_back(next);
-    }
-  }
 
   void record(double t, VectorXd y) override {
     result_.time.push_back(t);
@@ -292,8 +270,6 @@ class SystemFlight final : public Flight<Trajectory> {
   Scales scales_;
   std::unique_ptr<Stepper> stepper_;
   VectorXd y_dot_;
-  std::vector<double> times_;  // of outputs within a step, and their states
-  Eigen::MatrixXd samples_;
   WorkspaceHandle work_;
 };
 
@@ -318,15 +294,13 @@ void Stepper::interpolate_all(std::span<const double> times, Eigen::MatrixXd& Y)
 
 std::span<const IntegratorMethod> integrator_methods() { return methods; }
 
-const IntegratorMethod& integrator_method(const std::string& name, MethodFor wanted) {
+const IntegratorMethod& integrator_method(const std::string& name) {
   std::string known;
   for (const IntegratorMethod& m : methods) {
-    if (wanted == MethodFor::any && m.make == nullptr) continue;
     if (m.name == name) return m;
     known += fmt::format(" '{}'", m.name);
   }
-  throw InputError(fmt::format("integrator '{}' is not known{}; there are:{}", name,
-                               wanted == MethodFor::any ? " for trees" : "", known));
+  throw InputError(fmt::format("integrator '{}' is not known; there are:{}", name, known));
 }
 
 Trajectory integrate(const System& system, const VectorXd& y0, const IntegratorOptions& options,
@@ -334,7 +308,7 @@ Trajectory integrate(const System& system, const VectorXd& y0, const IntegratorO
   check_options(options, system.appendages().size());
   require(y0.size() == system.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   if (system.field()) system.field()->orbit.at(options.duration);  // does it last so long?
-  return SystemFlight(system, y0, options, integrator_method(options.method, MethodFor::system), so_far).fly();
+  return SystemFlight(system, y0, options, integrator_method(options.method), so_far).fly();
 }
 
 }  // namespace flexboom

@@ -15,6 +15,7 @@
 namespace flexboom {
 
 class Ode;
+class SplitProblem;
 
 struct IntegratorOptions : FlightOptions {
   std::string method = "exponential";
@@ -98,19 +99,22 @@ struct IntegratorMethod {
   /// Part of the tolerance wanted over a whole run that each step is asked for. Errors of undamped motion grow with its
   /// periods, so this is a start, not a promise: a run's error budget measures what was reached.
   double local_share;
-  /// Of any system.
+  /// One of the two is null.
   std::unique_ptr<Stepper> (*make)(std::unique_ptr<Ode>, const ErrorScale&);
-  /// Of a System, where the method needs its structure; else null.
-  std::unique_ptr<Stepper> (*make_of_system)(const System&, const ErrorScale&) = nullptr;
+  std::unique_ptr<Stepper> (*make_split)(std::unique_ptr<SplitProblem>, const ErrorScale&) = nullptr;
 };
 
 /// The table of methods: "exponential", "bdf", "adams", "dirk", "erk".
 std::span<const IntegratorMethod> integrator_methods();
 
-enum class MethodFor { system, any };
+/// @throws InputError for a name that is not in the table, listing those that are.
+const IntegratorMethod& integrator_method(const std::string& name);
 
-/// @throws InputError for a name that is not in the table, or not for any system where that is asked, listing those
-/// that are.
-const IntegratorMethod& integrator_method(const std::string& name, MethodFor);
+/// The method on a System or a Tree; `ode.hpp` and `split.hpp` tell it how.
+template <class Equations>
+std::unique_ptr<Stepper> make_stepper(const IntegratorMethod& method, const Equations& equations,
+                                      const ErrorScale& scale) {
+  return method.make != nullptr ? method.make(ode_of(equations), scale) : method.make_split(split(equations), scale);
+}
 
 }  // namespace flexboom

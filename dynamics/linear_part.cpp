@@ -40,24 +40,26 @@ void sum_of_products(Index m, const double* b, const double* z0, const double* M
 
 }  // namespace
 
-LinearPart::LinearPart(MatrixXd L_of_x, int omega_in_x, VectorXd base_p)
-    : LinearPart(spectrum_of(L_of_x), L_of_x, omega_in_x, std::move(base_p)) {}
+LinearPart::LinearPart(MatrixXd L_of_x, std::vector<int> omegas_in_x, VectorXd base_state)
+    : LinearPart(spectrum_of(L_of_x), L_of_x, std::move(omegas_in_x), std::move(base_state)) {}
 
 LinearPart::LinearPart(const LinearPart& other, MatrixXd L_of_x, int column)
-    : LinearPart(with_column(other, L_of_x.col(column) - other.L.col(column), column), L_of_x, other.first_omega,
+    : LinearPart(with_column(other, L_of_x.col(column) - other.L.col(column), column), L_of_x, other.omegas,
                  other.base) {}
 
-LinearPart::LinearPart(Spectrum spectrum, MatrixXd L_of_x, int omega_in_x, VectorXd base_p)
+LinearPart::LinearPart(Spectrum spectrum, MatrixXd L_of_x, std::vector<int> omegas_in_x, VectorXd base_state)
     : Spectrum(std::move(spectrum)),
       L(std::move(L_of_x)),
       of_modes(from_modes.transpose()),
-      base(std::move(base_p)),
-      first_omega(omega_in_x),
+      base(std::move(base_state)),
+      omegas(std::move(omegas_in_x)),
       lambda_re_(lambda.real()),
       lambda_im_(lambda.imag()),
       used_(lambda.size() + (lambda_im_.array() != 0).count()) {
-  if (first_omega < 0) return;
-  omega_modes = from_modes.middleRows<3>(first_omega);
+  if (omegas.empty()) return;
+  omega_modes.resize(3 * std::ssize(omegas), from_modes.cols());
+  for (size_t i = 0; i < omegas.size(); ++i)
+    omega_modes.middleRows<3>(3 * static_cast<Index>(i)) = from_modes.middleRows<3>(omegas[i]);
   drift_modes = omega_modes;
   const Index m = lambda.size();
   const double fastest = lambda.cwiseAbs().maxCoeff();

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <map>
+#include <vector>
 
 namespace flexboom {
 
@@ -18,11 +19,11 @@ using GridPoint = Eigen::MatrixXd;
 /// At every collocation point.
 using Grid = std::array<GridPoint, collocation::points>;
 
-/// L of x' = L x + N(x), x = (p, u), in its eigenvectors.
+/// L of x' = L x + N, in its eigenvectors.
 struct LinearPart : Spectrum {
-  /// Splits L; `first_omega`: place of the hub's angular velocity in x, or -1; `base`: p where L was taken.
+  /// Splits L; `omegas`: where angular velocities that attitudes follow are in x; `base`: the state where L was taken.
   /// @throws NumericalError when L has no full set of eigenvectors.
-  LinearPart(Eigen::MatrixXd L, int first_omega, Eigen::VectorXd base);
+  LinearPart(Eigen::MatrixXd L, std::vector<int> omegas, Eigen::VectorXd base);
 
   /// Of another L that differs in one column, as by a stop. What the difference hardly couples stays as it is (the
   /// remainder takes that), so most eigenvectors of many modes are those of `other`.
@@ -57,15 +58,15 @@ struct LinearPart : Spectrum {
 
   Eigen::MatrixXd L;              // nx x nx, in full
   Eigen::MatrixXd of_modes;       // from_modes, transposed: a coordinate of x by z
-  Eigen::MatrixXd omega_modes;    // omega by z
-  Eigen::MatrixXd drift_modes;    // omega by the part of z that stays: eigenvalues that are zero
+  Eigen::MatrixXd omega_modes;    // angular velocities by z, three rows each
+  Eigen::MatrixXd drift_modes;    // the same by the part of z that stays: eigenvalues that are zero
   Eigen::MatrixXd watched_modes;  // some entries of x by z, for who wants them alone
   Eigen::VectorXd base;
-  int first_omega;
+  std::vector<int> omegas;
   double step = 0;  // to try first after an event: that of the last time, or a longer one where its error was small
 
  private:
-  LinearPart(Spectrum, Eigen::MatrixXd L, int first_omega, Eigen::VectorXd base);
+  LinearPart(Spectrum, Eigen::MatrixXd L, std::vector<int> omegas, Eigen::VectorXd base);
 
   Eigen::VectorXd lambda_re_, lambda_im_;
   Eigen::Index used_;  // of z: the rest is always zero

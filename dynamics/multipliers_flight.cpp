@@ -274,7 +274,13 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     ida_->interpolate(t, y);
   }
 
-  void interpolate(double t, VectorXd& y) override { ida_->interpolate(t, y); }
+  void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override {
+    sample_.resize(size());
+    for (size_t i = 0; i < times.size(); ++i) {
+      ida_->interpolate(times[i], sample_);
+      Y.col(static_cast<Eigen::Index>(i)) = sample_;
+    }
+  }
 
   void observe(const VectorXd& y) override {
     scales_->observe(y);

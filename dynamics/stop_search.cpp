@@ -132,7 +132,8 @@ double StopSearch::crossing_at_places(const CollocatedStep& step, const At& at, 
 
 /// The first fraction of the step where the gap leaves the side of its flag, or no_crossing: behind `end` nobody asks.
 double StopSearch::first_crossing(const CollocatedStep& step, int hinge, double side, double end) {
-  const int gap = layout_.body[static_cast<size_t>(hinge)], rate = layout_.p + layout_.base + gap;
+  const SplitLayout::Coordinate at_stop = gaps_[static_cast<size_t>(hinge)];
+  const int gap = at_stop.value, rate = at_stop.rate;
   const LinearPart& linear = *step.linear;
   z_.resize(linear.size());
   const auto at = [&](double c) {

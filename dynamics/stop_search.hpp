@@ -2,7 +2,7 @@
 
 #include "dynamics/crossing.hpp"
 #include "dynamics/linear_part.hpp"
-#include "dynamics/system.hpp"
+#include "dynamics/split.hpp"
 
 #include <complex>
 #include <span>
@@ -11,19 +11,20 @@
 
 namespace flexboom {
 
-/// One step of exponential collocation: x = (p, u) at every place of it.
+/// One step of exponential collocation: x at every place of it.
 struct CollocatedStep {
   LinearPart* linear = nullptr;
   const Grid* grid = nullptr;
   double start = 0, length = 0;  // [s]
-  Eigen::MatrixXd X, Z, N;       // x (inner points: omega, gaps and rates alone), its coefficients, their remainders
-  Eigen::MatrixXd M;             // of the remainder, see LinearPart::combine
+  Eigen::MatrixXd X, Z,
+      N;              // x (inner points: angular velocities, gaps and rates alone), its coefficients, their remainders
+  Eigen::MatrixXd M;  // of the remainder, see LinearPart::combine
 };
 
 /// Finds where a hinge first meets or leaves its stop within a step that may be longer than its vibrations.
 class StopSearch {
  public:
-  explicit StopSearch(const Layout& layout) : layout_(layout) {}
+  explicit StopSearch(std::vector<SplitLayout::Coordinate> gaps) : gaps_(std::move(gaps)) {}
 
   /// The fraction at which the step ends: of the first crossing of an armed stop, or 1. crossed[i]: +1 where the gap of
   /// hinge i rises through zero there, -1 where it falls.
@@ -65,7 +66,7 @@ class StopSearch {
   double crossing_at_places(const CollocatedStep&, const At& at, const Clearance& from, const Clearance& to,
                             const Places&);
 
-  const Layout& layout_;
+  std::vector<SplitLayout::Coordinate> gaps_;  // of each stop
   std::vector<std::pair<int, double>> roots_;
   std::vector<Fast> fast_;
   Eigen::VectorXd z_, rates_, sizes_;  // rates: real parts, then imaginary parts; sizes: their squares

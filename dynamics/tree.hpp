@@ -29,7 +29,7 @@ struct TreeState {
   std::vector<double> spin;               // of the wheels relative to their bodies [rad/s]
 };
 
-/// Places of the parts of y = [p | u | attitudes, positions, velocities of joints | spins | energies].
+/// Places of the parts of y = [p | u | spins | attitudes, positions, velocities of joints | energies].
 /// p: per body the coordinates of the joint that carries it (less the threshold of its mechanism) and q. u: omega of
 /// joints that turn, then the derivative of p. Bodies come in the order of the tree (parents first, else as given).
 /// With one free body that carries hinged ones this is the Layout of System.
@@ -128,6 +128,8 @@ class Tree {
     return y[layout().rate(layout().joints[static_cast<size_t>(joint)].scalar)];
   }
 
+  /// Of a state with what is prescribed at t as prescribed; the second form imposes that.
+  TreeBalance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y, TreeWorkspace&) const;
   TreeBalance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y) const;
   PlaceMotionInSpace motion(double t, const Eigen::Ref<const Eigen::VectorXd>& y, const Place&) const;
   std::vector<JointLoad> joint_loads(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
@@ -137,8 +139,10 @@ class Tree {
   std::vector<StiffeningEffect> stiffening_effect(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
                                                   std::span<const char> contact) const;
 
- private:
   struct Impl;
+  const Impl& impl() const { return *impl_; }
+
+ private:
   std::unique_ptr<Impl> impl_;
 };
 

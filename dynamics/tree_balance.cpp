@@ -1,4 +1,5 @@
 #include "dynamics/tree_impl.hpp"
+#include "dynamics/tree_momenta.hpp"
 #include "fem/check.hpp"
 #include "reduction/geometric_stiffness.hpp"
 
@@ -30,9 +31,8 @@ TreeWorkspaceHandle evaluated(const Tree& system, const tree::Model& model, doub
   return work;
 }
 
-std::vector<char> open_stops(const Tree& system) { return std::vector<char>(system.scene().joints.size(), 0); }
-
-double elastic_energy(const tree::Link& link, const Joint& joint, const ReducedBody& body, const VectorXd& y) {
+double elastic_energy(const tree::Link& link, const Joint& joint, const ReducedBody& body,
+                      const Eigen::Ref<const VectorXd>& y) {
   const bool has_mechanism = link.kind == JointKind::hinge || link.kind == JointKind::slider;
   const double in_joint = has_mechanism ? energy(joint.mechanism, y[link.scalar]) : 0;
   const auto q = y.segment(link.q, link.body.n);
@@ -45,23 +45,10 @@ struct Totals {
   double m = 0;
   Vector3d first_moment = Vector3d::Zero();
 
-  void add(const tree::Link& link, const tree::LinkScratch<double>& s, const VectorXd& y) {
-    const Vec3<double> v = transposed_product(s.A0, s.v0), &w = s.w;
-    const double* q_dot = y.data() + link.q_dot;
-    const auto n = static_cast<size_t>(link.body.n);
-    Vec3<double> P = link.body.m * v + cross(w, s.mc), H = cross(s.mc, v) + s.J * w;
-    double modal = 0;
-    for (size_t k = 0; k < n; ++k) {
-      const Vec3<double>& Ct = link.second_order ? s.second_order.Ct[k] : link.body.Ct[k];
-      P += q_dot[k] * Ct;
-      H += q_dot[k] * s.modes.Cr[k];
-      double p = dot(Ct, v) + dot(s.modes.Cr[k], w);
-      const std::vector<double>& Me = link.second_order ? s.second_order.Me : link.body.Me;
-      for (size_t l = 0; l < n; ++l) p += Me[k * n + l] * q_dot[l];
-      modal += q_dot[k] * p;
-    }
-    balance.kinetic += 0.5 * (dot(v, P) + dot(w, H) + modal);
-    add_momenta(eigen(s.A0 * P), eigen(s.A0 * H), eigen(s.R0));
+  void add(const tree::Link& link, const tree::LinkScratch<double>& s, const Eigen::Ref<const VectorXd>& y) {
+    const tree::LinkMomenta own = tree::momenta(link, s, y.data() + link.q_dot);
+    balance.kinetic += own.kinetic;
+    add_momenta(eigen(s.A0 * own.linear), eigen(s.A0 * own.angular), eigen(s.R0));
     m += link.body.m;
     first_moment += link.body.m * eigen(s.R0) + eigen(s.A0 * s.mc);
   }
@@ -77,15 +64,22 @@ struct Totals {
 }  // namespace
 
 TreeBalance Tree::balance(double t, const Eigen::Ref<const VectorXd>& state) const {
-  const tree::Model& model = impl_->model;
   VectorXd y = state;
   impose(t, y);
-  const TreeWorkspaceHandle work = evaluated(*this, model, t, y, open_stops(*this));
-  tree::Scratch<double>& scratch = work->scratch;
+  return balance(t, y, *workspace());
+}
+
+TreeBalance Tree::balance(double t, const Eigen::Ref<const VectorXd>& y, TreeWorkspace& work) const {
+  require(y.size() == layout().size, "the state has the wrong size");
+  const tree::Model& model = impl_->model;
+  tree::Scratch<double>& scratch = work.scratch;
+  tree::set_instant(model, t, work.instant);
+  tree::move_links(model, y.data(), work.instant, true, scratch);
   Totals totals;
   TreeBalance& b = totals.balance;
   for (size_t i = 0; i < model.links.size(); ++i) {
     const tree::Link& link = model.links[i];
+    tree::add_body(link, y.data(), scratch.links[i]);
     totals.add(link, scratch.links[i], y);
     b.elastic += elastic_energy(link, impl_->scene.joints[static_cast<size_t>(link.joint)],
                                 impl_->scene.bodies[static_cast<size_t>(link.index)], y);

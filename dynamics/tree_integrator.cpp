@@ -3,6 +3,7 @@
 #include "dynamics/conservation.hpp"
 #include "dynamics/event_loop.hpp"
 #include "dynamics/ode.hpp"
+#include "dynamics/split.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
@@ -77,10 +78,6 @@ class TreeScales {
   ErrorScale error_;
 };
 
-const IntegratorMethod& method_of(const IntegratorOptions& options) {
-  return integrator_method(options.method == IntegratorOptions{}.method ? "adams" : options.method, MethodFor::any);
-}
-
 std::vector<Stop> stops_of(const Tree& tree) {
   std::vector<Stop> stops;
   for (const int joint : tree.stops()) {
@@ -98,7 +95,9 @@ class TreeFlight final : public Flight<TreeTrajectory> {
         tree_(tree),
         scales_(tree, y0, method.local_share * options.tolerance),
         ode_(ode_of(tree)),
-        stepper_(method.make(ode_of(tree), scales_.error())),
+        stepper_(make_stepper(method, tree, scales_.error())),
+        exact_in_linear_part_(method.make_split != nullptr),
+        work_(tree.workspace()),
         effect_(tree.scene().bodies.size()),
         y_dot_(y0.size()) {
     y_ = y0;
@@ -124,9 +123,11 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     return ode_->gap_rate(y_dot_.data(), static_cast<int>(stop));
   }
 
+  /// The exponential method has no error in what a hinge does when it hardly moves.
   double noise(size_t stop) const override {
     const ErrorScale& error = scales_.error();
-    return noise_of_methods * error.tolerance * error.scale[scalar(stop)];
+    const double of_steps = noise_of_methods * error.tolerance * error.scale[scalar(stop)];
+    return exact_in_linear_part_ ? std::min(of_steps, 1e-14 * contacts_.largest_gap(stop)) : of_steps;
   }
 
   void put_on_stop(size_t stop) override { y_[scalar(stop)] = 0; }
@@ -135,7 +136,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
 
   void restart() override { stepper_->restart(t_, y_, contacts_.closed(), contacts_.armed()); }
   void step(double limit, double& t, VectorXd& y) override { stepper_->step(limit, t, y, contacts_.crossed()); }
-  void interpolate(double t, VectorXd& y) override { stepper_->interpolate(t, y); }
+  void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override { stepper_->interpolate_all(times, Y); }
   void observe(const VectorXd& y) override { scales_.observe(y); }
   void keep_rows(size_t rows) override { result_.y.resize(rows), result_.balance.resize(rows); }
 
@@ -147,7 +148,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
       attitude.normalize();
     }
     tree_.impose(t, y);
-    result_.balance.push_back(tree_.balance(t, y));
+    result_.balance.push_back(tree_.balance(t, y, *work_));
     if (t == output_time()) look_at_stiffening(t, y);
     result_.time.push_back(t);
     result_.y.push_back(std::move(y));
@@ -183,6 +184,8 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   TreeScales scales_;
   std::unique_ptr<Ode> ode_;
   std::unique_ptr<Stepper> stepper_;
+  bool exact_in_linear_part_;
+  TreeWorkspaceHandle work_;
   std::vector<LargestStiffening> effect_;  // per body
   VectorXd y_dot_;
 };
@@ -223,7 +226,7 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   if (tree.scene().field) tree.scene().field->orbit.at(o.duration);  // does it last so long?
   VectorXd start = y0;
   tree.impose(o.start, start);
-  return TreeFlight(tree, start, o, method_of(o), so_far).fly();
+  return TreeFlight(tree, start, o, integrator_method(o.method), so_far).fly();
 }
 
 std::vector<Stiffening> stiffening_where_it_counts(const Multibody& scene, const TreeState& state, double duration,

@@ -173,7 +173,8 @@ void lay_out(const Multibody& scene, Model& model, TreeLayout& l) {
     l.base += type.turns ? 3 : 0;
   }
   l.u = l.base + l.p;
-  int omega = l.p, next = l.p + l.u;
+  l.spin = l.p + l.u;
+  int omega = l.p, next = l.spin + static_cast<int>(scene.wheels.size());
   for (Link& link : model.links) {
     const JointType& type = joint_type(link.kind);
     TreeLayout::Joint& joint = l.joints[static_cast<size_t>(link.joint)];
@@ -182,8 +183,6 @@ void lay_out(const Multibody& scene, Model& model, TreeLayout& l) {
     if (type.turns) joint.attitude = next, next += 4;
     if (type.floats) joint.velocity = next, next += 3;
   }
-  l.spin = next;
-  next += static_cast<int>(scene.wheels.size());
   l.dissipated = next;
   for (TreeLayout::Joint& joint : l.joints) joint.dissipated = next++;
   l.dissipated_elsewhere = next++;

@@ -138,7 +138,7 @@ TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
       {"value = [0, 0.1, 0]", "value = [0, 0.1]", "wheels[0].torque: "},
       {"time = [0, 1, 2]", "time = [0, 1, 1.5]", "the table reaches from 0 s to 1.5 s"},
       {"loads = true", "closes_loop = true", "formulation = \"multipliers\""},
-      {"method = \"bdf\"", "method = \"exponential\"", "integrator.method: is \"exponential\"; it must be"},
+      {"method = \"bdf\"", "method = \"ida\"", "integrator.method: is \"ida\"; it must be"},
       {"\"lift.length\"", "\"lift.lenght\"", "accuracy.outputs: is \"lift.lenght\"; did you mean \"lift.length\"?"},
       {"gravity = [0, 0, -9.81]", "gravity = [0, 0, -9.81]\norbit = { gravity = \"differential\" }",
        "gravity: is uniform, and orbit.gravity is that of the Earth"},

@@ -100,7 +100,7 @@ TEST(Collocation, IntegratesItsPolynomials) {
 // x' = L x + (polynomial): the state and its integral at a point against those of a long Taylor series.
 TEST(LinearPart, CarriesALinearSystemUnderAPolynomialExactly) {
   const MatrixXd L{{0, 1, 0}, {-400, -3, 7}, {2, 0, -1e3}};  // a vibration and a decay
-  LinearPart part(L, -1, VectorXd::Zero(1));
+  LinearPart part(L, {}, VectorXd::Zero(1));
   const VectorXd x0{{0.3, -2, 1}}, force{{0, 5, 0}};  // force * c^2, c = t / h
   const double h = 0.01;
   Eigen::MatrixXd M = MatrixXd::Zero(part.size(), collocation::points);
@@ -145,7 +145,7 @@ MatrixXd chain(int count, double stiffer) {
 TEST(LinearPart, FollowsFromAnotherThatDiffersInAColumn) {
   const int count = 12;
   const MatrixXd before = chain(count, 0), L = chain(count, 500);
-  const LinearPart other(before, -1, VectorXd::Zero(count)), part(other, L, 0), whole(L, -1, VectorXd::Zero(count));
+  const LinearPart other(before, {}, VectorXd::Zero(count)), part(other, L, 0), whole(L, {}, VectorXd::Zero(count));
   const MatrixXd I = MatrixXd::Identity(L.rows(), L.rows());
   EXPECT_LT((part.from_modes * part.to_modes - I).norm(), 1e-10);  // round-off of eigenvectors 1e4 from orthogonal
   int kept = 0;
@@ -173,7 +173,7 @@ TEST(LinearPart, FollowsFromAnotherThatDiffersInAColumn) {
 
 TEST(LinearPart, WithoutAFullSetOfEigenvectorsIsRefused) {
   const MatrixXd jordan{{0, 1}, {0, 0}};
-  EXPECT_THROW(LinearPart(jordan, -1, VectorXd::Zero(1)), NumericalError);
+  EXPECT_THROW(LinearPart(jordan, {}, VectorXd::Zero(1)), NumericalError);
 }
 
 System sport_boom(int modes, double stiffness_scale = 1) {

@@ -24,13 +24,9 @@ struct SearchCase {
   LinearPart linear;
   Grid grid;
   CollocatedStep step;
-  Layout layout;
 
   SearchCase(const VectorXd& w, const VectorXd& d, const VectorXd& a, const VectorXd& at)
-      : frequency(w), damping(d), amplitude(a), phase(at), n(w.size()), linear(matrix(w, d), -1, VectorXd::Zero(n)) {
-    layout.body = {0};
-    layout.p = layout.u = static_cast<int>(n);
-    layout.size = layout.p + layout.u + 1;
+      : frequency(w), damping(d), amplitude(a), phase(at), n(w.size()), linear(matrix(w, d), {}, VectorXd::Zero(n)) {
     step.linear = &linear;
     step.length = 1;
     linear.grid(1, grid);
@@ -88,7 +84,7 @@ struct SearchCase {
   double found() {
     const std::vector<char> contact = {0}, armed = {1};
     std::vector<int> crossed = {0};
-    const double end = StopSearch(layout).first_crossing(step, contact, armed, crossed);
+    const double end = StopSearch({{0, static_cast<int>(n)}}).first_crossing(step, contact, armed, crossed);
     return crossed[0] == 0 ? 2 : end;
   }
 };

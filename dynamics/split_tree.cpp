@@ -1,0 +1,169 @@
+#include "dynamics/conservation.hpp"
+#include "dynamics/split.hpp"
+#include "dynamics/tree_impl.hpp"
+#include "dynamics/tree_momenta.hpp"
+#include "fem/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using spatial::eigen;
+using spatial::Vec3;
+
+namespace {
+
+SplitLayout layout_of(const Tree& tree) {
+  const TreeLayout& l = tree.layout();
+  const tree::Model& model = tree.impl().model;
+  SplitLayout r;
+  r.x = l.p + l.u + static_cast<int>(model.wheels.size()), r.energies = l.dissipated, r.size = l.size;
+  for (size_t i = 0; i < model.wheels.size(); ++i) r.spins.push_back(l.spin + static_cast<int>(i));
+  bool spherical = false;
+  for (const tree::Link& link : model.links) {
+    const JointType& type = joint_type(link.kind);
+    for (int k = 0; k < type.scalars; ++k) {
+      r.joints.push_back(link.scalar + k);
+      if (link.prescribed)
+        for (const int i : {link.scalar + k, link.rate + k}) r.prescribed.push_back(i);
+      else
+        r.coordinates.push_back({link.scalar + k, link.rate + k});
+    }
+    for (int k = 0; k < link.body.n; ++k) r.coordinates.push_back({link.q + k, link.q_dot + k});
+    if (type.turns) r.turns.push_back({link.omega, link.attitude, type.floats});
+    if (type.floats) r.roots.push_back({link.position, link.velocity, link.attitude, link.omega});
+    spherical = spherical || (type.turns && !type.floats);
+    require(!type.floats || link.parent < 0,
+            fmt::format("integrator: exponential collocation has no free joint between two bodies, as joint {}; adams "
+                        "or bdf do",
+                        tree.scene().joints[static_cast<size_t>(link.joint)].name));
+  }
+  for (const int joint : tree.stops()) {
+    const int gap = l.joints[static_cast<size_t>(joint)].scalar;
+    r.gaps.push_back({gap, l.rate(gap)});
+  }
+  r.outside_pushes = model.poses || !tree.scene().gravity.isZero(0);
+  r.attitudes_matter = model.poses || spherical;
+  r.momentum_is_kept = r.roots.size() == 1 && is_isolated(tree.scene());
+  return r;
+}
+
+class SplitTree final : public SplitProblem {
+ public:
+  explicit SplitTree(const Tree& tree)
+      : tree_(tree),
+        model_(tree.impl().model),
+        layout_(layout_of(tree)),
+        work_(tree.workspace()),
+        contact_(tree.scene().joints.size(), 0),
+        y_(layout_.size) {
+    for (const tree::Link& link : model_.links) {  // parents come first
+      if (link.parent < 0)
+        roots_.push_back(link.kind == JointKind::free ? floating_++ : -1);
+      else
+        roots_.push_back(roots_[static_cast<size_t>(link.parent)]);
+      if (link.parent < 0 && link.kind == JointKind::free) root_links_.push_back(&link);
+    }
+  }
+
+  const SplitLayout& layout() const override { return layout_; }
+
+  void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) override {
+    tree_.derivative(t, y, of_joints(contact), *work_, y_dot);
+  }
+
+  Vector3d outside_acceleration(size_t root, double, const double*) override {
+    Vector3d force = Vector3d::Zero();
+    double m = 0;
+    for (size_t i = 0; i < model_.links.size(); ++i) {
+      if (roots_[i] != static_cast<int>(root)) continue;
+      const tree::LinkScratch<double>& s = work_->scratch.links[i];
+      m += model_.links[i].body.m;
+      if (model_.poses) force += eigen(s.A0 * s.external.t);
+    }
+    return to_root(root) * (tree_.scene().gravity + force / m);
+  }
+
+  MatrixXd linear(double t, const double* y, std::span<const char> contact) override {
+    tree_.jacobian(t, y, of_joints(contact), *work_, J_);
+    return J_.topLeftCorner(layout_.x, layout_.x);
+  }
+
+  FloatingBodies floating(size_t root, double t, const double* y) override {
+    y_ = Eigen::Map<const VectorXd>(y, layout_.size);
+    for (const SplitLayout::Root& r : layout_.roots)
+      y_.segment<3>(r.position).setZero(), y_.segment<3>(r.velocity).setZero();
+    tree::Scratch<double>& scratch = work_->scratch;
+    tree::set_instant(model_, t, work_->instant);
+    tree::move_links(model_, y_.data(), work_->instant, true, scratch);
+    const Vector3d origin = eigen(root_links_[root]->a.position);
+    double m = 0;
+    Vector3d moment = Vector3d::Zero(), P = Vector3d::Zero(), H = Vector3d::Zero();
+    Matrix3d J = Matrix3d::Zero();
+    for (size_t i = 0; i < model_.links.size(); ++i) {
+      if (roots_[i] != static_cast<int>(root)) continue;
+      tree::LinkScratch<double>& s = scratch.links[i];
+      tree::add_body(model_.links[i], y_.data(), s);
+      const tree::LinkMomenta own = tree::momenta(model_.links[i], s, y_.data() + model_.links[i].q_dot);
+      const double mass = model_.links[i].body.m;
+      const Vector3d R = eigen(s.R0) - origin, c = eigen(s.A0 * s.mc), linear = eigen(s.A0 * own.linear);
+      m += mass, moment += mass * R + c, P += linear;
+      H += eigen(s.A0 * own.angular) + R.cross(linear);
+      J += spatial::eigen(equations::rotate(s.A0, s.J)) + spread(R, R, mass) + spread(R, c, 1) + spread(c, R, 1);
+    }
+    for (size_t i = 0; i < model_.wheels.size(); ++i) {
+      const auto link = static_cast<size_t>(model_.wheels[i].link);
+      if (roots_[link] != static_cast<int>(root)) continue;
+      const tree::LinkScratch<double>& s = scratch.links[link];
+      const Vec3<double>& axis = model_.wheels[i].at.position;
+      const Vector3d in_space = eigen(s.A0 * axis);
+      const double inertia = tree_.scene().wheels[i].inertia;
+      H += inertia * (y_[layout_.spins[i]] + dot(axis, s.w)) * in_space;
+      J += inertia * in_space * in_space.transpose();
+    }
+    const Vector3d c = moment / m;
+    const Matrix3d A = to_root(root);
+    return {A * c, A * P / m, A * (J - spread(c, c, m)) * A.transpose(), A * (H - c.cross(P))};
+  }
+
+ private:
+  /// m (a . b 1 - a b^T), symmetric part.
+  static Matrix3d spread(const Vector3d& a, const Vector3d& b, double m) {
+    return m * (a.dot(b) * Matrix3d::Identity() - 0.5 * (a * b.transpose() + b * a.transpose()));
+  }
+
+  /// Inertial axes -> axes of the root's position.
+  Matrix3d to_root(size_t root) const {
+    Matrix3d A;
+    for (int i = 0; i < 3; ++i) A.col(i) = eigen(root_links_[root]->a.axes.row[static_cast<size_t>(i)]);
+    return A;
+  }
+
+  std::span<const char> of_joints(std::span<const char> contact) {
+    for (size_t i = 0; i < contact.size(); ++i) contact_[static_cast<size_t>(tree_.stops()[i])] = contact[i];
+    return contact_;
+  }
+
+  const Tree& tree_;
+  const tree::Model& model_;
+  SplitLayout layout_;
+  TreeWorkspaceHandle work_;
+  std::vector<char> contact_;  // per joint
+  std::vector<int> roots_;     // per link: which root it hangs on, or -1
+  std::vector<const tree::Link*> root_links_;
+  int floating_ = 0;
+  VectorXd y_;
+  MatrixXd J_;
+};
+
+}  // namespace
+
+std::unique_ptr<SplitProblem> split(const Tree& tree) { return std::make_unique<SplitTree>(tree); }
+
+}  // namespace flexboom
