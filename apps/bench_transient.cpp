@@ -53,8 +53,7 @@ std::vector<std::string> methods_of(const Scene& scene) {
     require(!j.closes_loop,
             fmt::format("scene {} closes a loop: one method flies it, there is nothing to compare", scene.name));
   std::vector<std::string> names;
-  for (const IntegratorMethod& m : integrator_methods())
-    if (!scene.is_tree || m.make != nullptr) names.emplace_back(m.name);
+  for (const IntegratorMethod& m : integrator_methods()) names.emplace_back(m.name);
   names.emplace_back(by_multipliers);
   return names;
 }

@@ -135,6 +135,7 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   j["interrupted"] = s.interrupted;
   j["simulated_seconds"] = simulated;
   j["integrator"] = s.method;
+  if (!s.why_method.empty()) j["integrator_chosen"] = s.why_method;
   j["tolerance"] = r.scene.tolerance;
   j["energy_balance"] = s.energy_balance;
   j["momentum_drift"] = s.momentum_drift;  // unknown is null

@@ -345,6 +345,11 @@ std::string damping_text(const DampingRule& d) {
   return fmt::format("structural damping '{}', value {:g}", d.name, d.value);
 }
 
+std::string why_method(const Scene& scene, const IntegrationSummary& s) {
+  if (scene.integrator != "auto") return "as asked";
+  return s.why_method.empty() ? "chosen" : "chosen: " + s.why_method;
+}
+
 void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan) {
   for (size_t i = 0; i < run.bodies.size(); ++i) {
     const BodyScene& b = scene.bodies[i];
@@ -364,7 +369,7 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
                                h.hinge.mechanism.damping, h.hinge.mechanism.stop_stiffness));
   plan.push_back(
       fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
-                  run.motion.summary.method, scene.integrator == "auto" ? "chosen" : "as asked", scene.tolerance));
+                  run.motion.summary.method, why_method(scene, run.motion.summary), scene.tolerance));
   plan.push_back(scene.formulation == "multipliers" ? "formulation: redundant coordinates, joints by multipliers"
                                                     : "formulation: relative coordinates");
   if (scene.is_tree) return describe_tree(scene, run, plan);

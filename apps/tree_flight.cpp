@@ -260,9 +260,8 @@ void set_corners(const Scene& scene, IntegratorOptions& o) {
 
 namespace {
 
-IntegratorOptions options_of(const Scene& scene, const Multibody& bodies, const RunHooks& hooks, long max_steps) {
-  const bool elastic = std::any_of(bodies.bodies.begin(), bodies.bodies.end(), [](const auto& b) { return b.n() > 0; });
-  IntegratorOptions o = integrator_options(scene, hooks, elastic ? "bdf" : "adams", max_steps);
+IntegratorOptions options_of(const Scene& scene, const RunHooks& hooks, long max_steps) {
+  IntegratorOptions o = integrator_options(scene, hooks, "auto", max_steps);
   set_corners(scene, o);
   return o;
 }
@@ -327,7 +326,7 @@ void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<
 Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
   const Stopwatch start;
   const Multibody multibody = make_multibody(scene, bodies);
-  IntegratorOptions options = options_of(scene, multibody, hooks, max_steps);
+  IntegratorOptions options = options_of(scene, hooks, max_steps);
   if (scene.from) options.stops = scene.from->stops(joint_names(scene));
   std::vector<Stiffening> stiffening = first_stiffening(scene, multibody);
   Run r;

@@ -90,7 +90,7 @@ class ExponentialStepper final : public Stepper {
       }
       ++counts_.error_test_failures;
       if (!(step_.length > 1e-14 * std::max(1.0, std::abs(step_.start))))
-        throw NumericalError(
+        throw MethodFailure(
             fmt::format("exponential: no step is small enough at t = {:.9g} s; eigenvalues reach {:.2g} 1/s, whose "
                         "round-off may be more than the tolerance: fewer modes, or a coarser one",
                         step_.start, step_.linear->lambda.cwiseAbs().maxCoeff()));
@@ -284,7 +284,15 @@ class ExponentialStepper final : public Stepper {
     first_ = false;
   }
 
-  /// F and what the motion of the hub needs at point j.
+  /// The time at a fraction c. What is given as a function of time may jump where a step starts or ends: inside of it,
+  /// by round-off, there is one value.
+  double within_step(double c) const {
+    const double end = step_.start + step_.length;
+    const double inside = std::min(0.25 * step_.length, 4e-16 * std::max(std::abs(step_.start), std::abs(end)));
+    return std::clamp(step_.start + c * step_.length, step_.start + inside, end - inside);
+  }
+
+  /// F and what follows x needs at point j.
   void evaluate(int j) {
     const double c = collocation::node(j);
     y_.head(nx_) = step_.X.col(j);
@@ -293,7 +301,7 @@ class ExponentialStepper final : public Stepper {
       motion_.turn(step_, (*step_.grid)[static_cast<size_t>(j)], c, y_);
       motion_.place(step_, c, y_);
     }
-    const double t = j == 0 ? step_.start : step_.start + c * step_.length;
+    const double t = within_step(c);
     problem_->derivative(t, y_.data(), contact_, y_dot_.data());
     ++counts_.rhs_evaluations;
     F_.col(j) = y_dot_.head(nx_);

@@ -2,6 +2,7 @@
 
 #include "dynamics/contacts.hpp"
 #include "dynamics/system.hpp"
+#include "fem/check.hpp"
 
 #include <Eigen/Core>
 
@@ -27,6 +28,7 @@ struct IntegratorOptions : FlightOptions {
 /// What an integration did, and how well it kept what must be kept.
 struct IntegrationSummary {
   std::string method;
+  std::string why_method;  // where the program chose it
   long steps = 0;
   long rhs_evaluations = 0;
   long jacobian_evaluations = 0;
@@ -61,6 +63,12 @@ Trajectory integrate(const System&, const Eigen::VectorXd& y0, const IntegratorO
 struct ErrorScale {
   double tolerance = 1e-7;  // per step
   Eigen::VectorXd scale;    // one per state, never zero
+};
+
+/// A method that cannot go on where another may.
+class MethodFailure : public NumericalError {
+ public:
+  using NumericalError::NumericalError;
 };
 
 struct StepCounts {

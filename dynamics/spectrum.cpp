@@ -1,5 +1,6 @@
 #include "dynamics/spectrum.hpp"
 
+#include "dynamics/integrator.hpp"
 #include "dynamics/secular.hpp"
 #include "dynamics/small_product.hpp"
 #include "fem/check.hpp"
@@ -49,7 +50,7 @@ Spectrum spectrum_of(MatrixXd L) {
   const double growth =
       eigen.vectors.cwiseAbs().rowwise().sum().maxCoeff() * inverse.cwiseAbs().rowwise().sum().maxCoeff();
   if (!(growth < 1e10))
-    throw NumericalError(
+    throw MethodFailure(
         fmt::format("exponential: the Jacobian has no full set of eigenvectors ({:.2g}); try bdf", growth));
   const Index m = (eigen.imaginary.array() >= 0).count();
   Spectrum s{Eigen::VectorXcd(m), MatrixXd::Zero(L.rows(), 2 * m), MatrixXd::Zero(2 * m, L.rows())};

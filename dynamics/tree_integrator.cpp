@@ -5,6 +5,7 @@
 #include "dynamics/ode.hpp"
 #include "dynamics/split.hpp"
 #include "fem/check.hpp"
+#include "fem/dense.hpp"
 
 #include <fmt/format.h>
 
@@ -13,6 +14,7 @@
 
 namespace flexboom {
 
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
@@ -219,6 +221,56 @@ std::vector<std::string> stiffening_warnings(const Multibody& scene, const std::
   return warnings;
 }
 
+namespace {
+
+struct MethodChoice {
+  std::string name, why;
+};
+
+/// Of a method for this start: by how long the steps of exponential collocation become beside the fastest vibration,
+/// in its first steps.
+MethodChoice choose_method(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o) {
+  constexpr int pilot_steps = 50;
+  constexpr double enough = 0.1;  // of a radian: shorter steps are those of any method, and others do less in a step
+  const IntegratorMethod& exponential = integrator_method("exponential");
+  TreeScales scales(tree, y0, exponential.local_share * o.tolerance);
+  std::vector<char> closed, armed(tree.stops().size(), 0);
+  for (const int joint : tree.stops()) closed.push_back(tree.gap(y0.data(), joint) > 0);
+  double end = o.duration;
+  for (const double corner : o.corners)
+    if (corner > o.start) end = std::min(end, corner);
+  try {
+    const std::unique_ptr<SplitProblem> problem = split(tree);
+    const SplitLayout& layout = problem->layout();
+    VectorXd at_rest = y0;
+    for (const SplitLayout::Coordinate& c : layout.coordinates) at_rest[c.rate] = 0;
+    for (const SplitLayout::Turn& turn : layout.turns) at_rest.segment<3>(turn.omega).setZero();
+    const RealEigenvectors eigen = eigenvectors(problem->linear(o.start, at_rest.data(), closed));
+    const double fastest = std::sqrt((eigen.real.cwiseAbs2() + eigen.imaginary.cwiseAbs2()).maxCoeff());
+    const std::unique_ptr<Stepper> stepper = make_stepper(exponential, tree, scales.error());
+    stepper->restart(o.start, y0, closed, armed);
+    double t = o.start, turned = 0;
+    VectorXd y = y0;
+    std::vector<int> crossed(closed.size());
+    for (int i = 0; i < pilot_steps && t < end && turned < enough; ++i) {
+      const double before = t;
+      stepper->step(end, t, y, crossed);
+      scales.observe(y);
+      turned = std::max(turned, (t - before) * fastest);
+    }
+    if (turned >= enough)
+      return {"exponential",
+              fmt::format("its steps pass {:.2g} rad of the fastest motion, {:.3g} rad/s", turned, fastest)};
+    const bool cheap = layout.x <= 12;  // an evaluation costs less than what a multistep method does beside it
+    return {cheap ? "erk" : "adams",
+            fmt::format("what is nonlinear sets the steps: no linear motion is faster than {:.2g} rad/s", fastest)};
+  } catch (const std::exception& failure) {
+    return {"bdf", fmt::format("exponential collocation cannot: {}", failure.what())};
+  }
+}
+
+}  // namespace
+
 TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o,
                          const Checkpoint<TreeTrajectory>& so_far) {
   check_options(o, tree.scene().joints.size());
@@ -226,7 +278,18 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   if (tree.scene().field) tree.scene().field->orbit.at(o.duration);  // does it last so long?
   VectorXd start = y0;
   tree.impose(o.start, start);
-  return TreeFlight(tree, start, o, integrator_method(o.method), so_far).fly();
+  if (o.method != "auto") return TreeFlight(tree, start, o, integrator_method(o.method), so_far).fly();
+  MethodChoice choice = choose_method(tree, start, o);
+  TreeTrajectory result;
+  try {
+    result = TreeFlight(tree, start, o, integrator_method(choice.name), so_far).fly();
+  } catch (const MethodFailure& failure) {
+    if (choice.name != "exponential") throw;
+    choice = {"bdf", fmt::format("exponential collocation could not: {}", failure.what())};
+    result = TreeFlight(tree, start, o, integrator_method(choice.name), so_far).fly();
+  }
+  result.summary.why_method = choice.why;
+  return result;
 }
 
 std::vector<Stiffening> stiffening_where_it_counts(const Multibody& scene, const TreeState& state, double duration,

@@ -31,7 +31,7 @@ struct TreeTrajectory {
   std::vector<std::string> warnings;
 };
 
-/// Flies the tree from y0.
+/// Flies the tree from y0. Method "auto": the one that suits its start, and bdf where that fails.
 /// `rescale_at_events` is not heard: errors are measured against the largest motion so far.
 /// @throws InputError for an unknown method or bad options; NumericalError when the method fails.
 TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const IntegratorOptions&,

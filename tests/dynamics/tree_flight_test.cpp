@@ -68,8 +68,36 @@ Multibody two_link_arm(double gravity) {
   return scene;
 }
 
+TEST(TreeFlight, TheMethodSuitsTheScene) {
+  // A flexible arm vibrates within its steps; a rigid body that tumbles has no linear part.
+  const Tree arm(two_link_arm(9.81));
+  TreeState bent = arm.at_rest();
+  bent.joints[0].coordinate = {0.3}, bent.joints[1].coordinate = {0.5};
+  const TreeTrajectory stiff = integrate(arm, arm.pack(bent), tree_options("auto", 1e-6, 0.5, 0.02));
+  EXPECT_EQ(stiff.summary.method, "exponential");
+  EXPECT_NE(stiff.summary.why_method.find("of the fastest motion"), std::string::npos) << stiff.summary.why_method;
+  const Tree body(free_bodies({{0.134942, 0.10477, 0.05858}}));
+  TreeState tumbling = body.at_rest();
+  tumbling.joints[0].omega = Vector3d(0.1, 1, 0.05);
+  const TreeTrajectory slow = integrate(body, body.pack(tumbling), tree_options("auto", 1e-6, 5, 0.1));
+  EXPECT_EQ(slow.summary.method, "erk");
+  EXPECT_NE(slow.summary.why_method.find("nonlinear"), std::string::npos) << slow.summary.why_method;
+}
+
+TEST(TreeFlight, AFreeJointBetweenBodiesIsNotForExponentialCollocation) {
+  Multibody scene = free_bodies({{0.1, 0.2, 0.25}, {0.1, 0.2, 0.25}});
+  scene.joints[1].a = place(0, Vector3d(1, 0, 0));
+  const Tree tree(scene);
+  TreeState s = tree.at_rest();
+  s.joints[0].omega = Vector3d(0.1, 1, 0.05);
+  EXPECT_THROW(integrate(tree, tree.pack(s), tree_options("exponential", 1e-6, 1, 0.1)), InputError);
+  const TreeTrajectory flight = integrate(tree, tree.pack(s), tree_options("auto", 1e-8, 1, 0.1));
+  EXPECT_EQ(flight.summary.method, "bdf");
+  EXPECT_NE(flight.summary.why_method.find("free joint between two bodies"), std::string::npos);
+}
+
 TEST(TreeFlight, FlexibleArmKeepsItsEnergy) {
-  for (const char* method : {"adams", "bdf", "dirk"}) {
+  for (const char* method : {"exponential", "adams", "bdf", "dirk"}) {
     const Tree tree(two_link_arm(9.81));
     TreeState s = tree.at_rest();
     s.joints[0].coordinate = {0.3};
