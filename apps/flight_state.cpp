@@ -1,5 +1,6 @@
 #include "apps/flight_state.hpp"
 
+#include "apps/scene_law.hpp"
 #include "apps/toml_reader.hpp"
 #include "apps/toml_writer.hpp"
 #include "apps/version.hpp"
@@ -113,6 +114,8 @@ std::vector<std::string> state_names(const Tree& tree) {
     names.set_quaternion(at.attitude, joint.name + ".attitude");
     names.set_vector(at.velocity, joint.name + ".velocity");
     names.set(at.dissipated, joint.name + ".dissipated");
+    for (size_t k = 0; at.losses >= 0 && k < law_losses.size(); ++k)
+      names.set(at.losses + static_cast<int>(k), fmt::format("{}.lost.{}", joint.name, law_losses[k]));
   }
   for (size_t b = 0; b < l.q.size(); ++b) {
     const ReducedBody& body = tree.scene().bodies[b];
@@ -150,6 +153,9 @@ std::string to_toml(const FlightState& state, const std::string& scene) {
   out.table("[stops.settled]");
   for (const auto& [name, stop] : state.stops)
     if (stop.settled >= 0) out.key(toml(name), stop.settled);
+  out.table("[stops.law]");
+  for (const auto& [name, stop] : state.stops)
+    if (stop.law) out.key(toml(name), law_state_text(*stop.law));
   out.table("[loops]");
   for (const auto& [joint, angle] : state.loops) out.key(toml(joint), angle);
   std::string text = std::move(out).text();
@@ -180,6 +186,15 @@ std::map<std::string, double> numbers_of(TableReader& table) {
   std::map<std::string, double> numbers;
   for (const auto& [name, value] : table.value().entries) numbers[name] = finite(table, name);
   return numbers;
+}
+
+std::optional<LawState> read_law_state(TableReader& laws, const std::string& joint) {
+  try {
+    return law_state_of(laws.text(joint));
+  } catch (const InputError& error) {
+    laws.fault(joint, error.what());
+    return {};
+  }
 }
 
 std::string first_few(const std::vector<std::string>& names) {
@@ -248,6 +263,8 @@ SavedState SavedState::read(const fs::path& path, bool changed_too) {
     for (const auto& [name, gap] : numbers_of(*stops, "largest_gap")) content->stops[name].largest_gap = gap;
     if (std::optional<TableReader> closed = stops->table("closed"))
       for (const auto& [name, value] : closed->value().entries) content->stops[name].closed = closed->boolean(name);
+    if (std::optional<TableReader> laws = stops->table("law"))
+      for (const auto& [name, value] : laws->value().entries) content->stops[name].law = read_law_state(*laws, name);
     for (const auto& [name, time] : numbers_of(*stops, "settled")) content->stops[name].settled = time;
     stops->reject_unknown();
   }

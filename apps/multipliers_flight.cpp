@@ -57,10 +57,22 @@ IntegrationSummary summary_of(const MultipliersSummary& s) {
   return r;
 }
 
-void set_energies(MultipliersOptions& o, const TreeLayout& l, const VectorXd& y0) {
+void set_energies(MultipliersOptions& o, const Multibody& scene, const TreeLayout& l, const VectorXd& y0) {
   o.dissipated = y0[l.dissipated_elsewhere];
-  for (const TreeLayout::Joint& j : l.joints) o.dissipated += y0[j.dissipated];
   o.work = y0[l.work];
+  auto of_tree = l.joints.begin();
+  for (const Joint& j : scene.joints) {
+    o.lost.emplace_back();
+    if (j.closes_loop) continue;
+    const TreeLayout::Joint& at = *of_tree++;
+    const HingeMechanism& m = j.mechanism;
+    if (j.law.given() || m.stiffness != 0 || m.damping != 0 || m.stop_stiffness != 0)
+      o.lost.back() = {y0[at.dissipated]};
+    else
+      o.dissipated += y0[at.dissipated];
+    for (int k = 0; at.losses >= 0 && k < static_cast<int>(law_losses.size()); ++k)
+      o.lost.back().push_back(y0[at.losses + k]);
+  }
 }
 
 /// Joints number from `first`.
@@ -157,7 +169,18 @@ struct FlownByMultipliers {
 
   VectorXd y(size_t row) const {
     VectorXd y = tree.pack(without_loops(scene, states[row]));
-    y[tree.layout().dissipated_elsewhere] = flight.states[row].dissipated;
+    double elsewhere = flight.states[row].dissipated;
+    auto of_tree = tree.layout().joints.begin();
+    for (size_t i = 0; i < scene.joints.size(); ++i) {
+      if (scene.joints[i].closes_loop) continue;
+      const TreeLayout::Joint& at = *of_tree++;
+      const std::vector<double>& lost = flight.states[row].lost[i];
+      for (size_t k = 0; k < lost.size(); ++k) {
+        y[k == 0 ? at.dissipated : at.losses + static_cast<int>(k) - 1] = lost[k];
+        elsewhere -= lost[k];
+      }
+    }
+    y[tree.layout().dissipated_elsewhere] = elsewhere;
     y[tree.layout().work] = flight.states[row].work;
     return y;
   }
@@ -177,6 +200,9 @@ void set_flown(const FlownByMultipliers& f, size_t first, size_t last, const std
                       balance_of(f.tree, f.flight, row, r.motion.y[i])};
   });
   r.warnings = warnings_of(f.scene, f.system.multibody(), f.flight, r.stiffening_effect, stiffening);
+  const MultibodyState& last_state = f.flight.states.back();
+  const TreeBalance at_end = balance_of(f.tree, f.flight, f.states.size() - 1, f.y(f.states.size() - 1));
+  r.ledger = EnergyOfRun{at_end.kinetic, at_end.potential, at_end.work, last_state.ledger};
   r.motion.events = events_of(f.flight.events, 0);
   r.motion.summary = summary_of(f.flight.summary);
   r.end = end_of(r, f.scene, f.flight.time.back(), f.y(f.states.size() - 1), r.motion.summary);
@@ -231,7 +257,7 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
     const std::vector<BodyState> closed = close_joints(*system, body_states(*r.tree, options.start, y0), options.start);
     MultipliersOptions of_flight =
         multipliers_options(options, start_angles(system->multibody(), asked, scene.from.get()));
-    set_energies(of_flight, r.tree->layout(), y0);
+    set_energies(of_flight, all, r.tree->layout(), y0);
     flight = integrate_multipliers(*system, closed, of_flight, checkpoint);
     effect = largest_stiffening(*system, flight);
     return flight.summary.interrupted;

@@ -62,8 +62,7 @@ std::string event_rows(const RunResult& r, size_t first) {
   std::string out;
   for (size_t i = first; i < r.trajectory.events.size(); ++i) {
     const StopEvent& e = r.trajectory.events[i];
-    out +=
-        fmt::format("{:.17g},{},{}\n", e.time, hinges[static_cast<size_t>(e.joint)], e.contact ? "contact" : "release");
+    out += fmt::format("{:.17g},{},{}\n", e.time, hinges[static_cast<size_t>(e.joint)], event_name(e));
   }
   return out;
 }
@@ -82,6 +81,19 @@ ordered_json budget_json(const ErrorBudget& b) {
           {"time", b.time},
           {"linearisation", b.linearisation},
           {"total", b.total()}};
+}
+
+/// null: of a hub without joints.
+ordered_json energy_json(const std::optional<EnergyOfRun>& energy) {
+  if (!energy) return nullptr;
+  const EnergyLedger& e = energy->ledger;
+  ordered_json lost = {{"damper", e.dampers}, {"structure", e.elsewhere}};
+  for (size_t i = 0; i < law_losses.size(); ++i) lost[std::string(law_losses[i])] = e.laws[i];
+  return {{"kinetic", energy->kinetic},
+          {"potential", energy->potential},
+          {"stored", {{"spring", e.springs}, {"stop", e.stops}, {"structure", e.structures}}},
+          {"lost", lost},
+          {"work", energy->work}};
 }
 
 ordered_json bodies_json(const RunResult& r) {
@@ -138,6 +150,7 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   if (!s.why_method.empty()) j["integrator_chosen"] = s.why_method;
   j["tolerance"] = r.scene.tolerance;
   j["energy_balance"] = s.energy_balance;
+  j["energy"] = energy_json(r.ledger);
   j["momentum_drift"] = s.momentum_drift;  // unknown is null
   j["constraint_drift"] = s.constraint_drift;
   j["error_budget"] = budget_json(r.budget);

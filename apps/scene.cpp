@@ -1,6 +1,7 @@
 #include "apps/scene.hpp"
 
 #include "apps/scene_keys.hpp"
+#include "apps/scene_law.hpp"
 #include "apps/toml_reader.hpp"
 #include "fem/check.hpp"
 #include "reduction/body_file.hpp"
@@ -309,6 +310,7 @@ HingeScene read_hinge(TableReader table) {
   mechanism.stiffness = read_stiffness(table, mechanism.threshold);
   mechanism.damping = table.number("P2", mechanism.damping);
   mechanism.stop_stiffness = table.number("P3", mechanism.stop_stiffness);
+  hinge.law = read_law(table);
   hinge.start_angle = table.number("start_angle", mechanism.rest);
   hinge.start_rate = table.number("start_rate", hinge.start_rate);
   table.reject_unknown();
@@ -380,9 +382,14 @@ bool beyond_a_hub(TableReader& table) {
              (entry.first == "file" && entry.second.text.ends_with(".h5"));
     });
   };
-  for (const auto& [key, value] : table.value().entries)
-    if (key == "bodies") return std::ranges::any_of(value.items, says_more);
-  return false;
+  const auto has_law = [](const Value& hinge) {
+    return std::ranges::any_of(hinge.entries, [](const auto& entry) { return is_law_key(entry.first); });
+  };
+  return std::ranges::any_of(table.value().entries, [&](const auto& entry) {
+    const auto& [key, value] = entry;
+    return (key == "bodies" && std::ranges::any_of(value.items, says_more)) ||
+           (key == "hinges" && std::ranges::any_of(value.items, has_law));
+  });
 }
 
 /// Writes [hub] and [[hinges]] out: a rigid body that flies, or the inertial frame where it is fixed, and joints.
@@ -404,7 +411,7 @@ void write_out_shorthand(Scene& scene) {
     joint.a = {.body = hub, .point = h.hinge.point, .x = h.hinge.stowed};
     joint.a.z = h.hinge.stowed.cross(h.hinge.outward).normalized();
     joint.b.body = h.body;
-    joint.mechanism = h.hinge.mechanism;
+    joint.mechanism = h.hinge.mechanism, joint.law = h.law;
     joint.start = {h.start_angle}, joint.start_rate = {h.start_rate};
     scene.joints.push_back(std::move(joint));
   }

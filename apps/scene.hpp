@@ -61,6 +61,7 @@ struct HubScene {
 struct HingeScene {
   std::string body;  // BodyScene::name; also the hinge's name
   Hinge hinge;
+  JointLaw law;            // beside its mechanism; then the scene is one with joints
   double start_angle = 0;  // [rad]
   double start_rate = 0;   // [rad/s]
 };

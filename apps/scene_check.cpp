@@ -2,6 +2,7 @@
 #include "apps/scene.hpp"
 #include "apps/scene_checks.hpp"
 #include "apps/scene_keys.hpp"
+#include "apps/scene_law.hpp"
 #include "dynamics/integrator.hpp"
 
 #include <fmt/format.h>
@@ -83,6 +84,11 @@ void check_integrator(Faults& faults, const Scene& scene) {
     if (!redundant) methods.push_back(m.name);
   check_name_among(faults, "integrator.method", scene.integrator, methods);
   if (redundant) check_multipliers(scene, faults);
+  const bool has_laws = std::ranges::any_of(scene.joints, [](const JointScene& j) { return j.law.given(); });
+  if (has_laws && scene.integrator == "exponential")
+    faults.add("integrator.method",
+               "is \"exponential\", which simulates no laws of joints; \"auto\", \"adams\", "
+               "\"bdf\", \"dirk\" and \"erk\" do");
   if (!(std::isfinite(scene.settle) && scene.settle < 1)) {
     faults.add("integrator.settle",
                fmt::format("is {}; it must be below 1 (0: never, negative: the tolerance)", scene.settle));
@@ -145,6 +151,9 @@ void check_hinge(Faults& faults, const std::string& path, const HingeScene& hing
   check_not_negative(faults, join(path, "P3"), mechanism.stop_stiffness, " N m/rad");
   check_finite(faults, join(path, "rest"), mechanism.rest);
   check_finite(faults, join(path, "threshold"), mechanism.threshold);
+  Joint with_law;
+  with_law.mechanism = mechanism, with_law.law = hinge.law;
+  check_law(faults, path, with_law, hinge.start_angle);
   check_start(faults, join(path, "start_angle"), hinge.start_angle, " rad");
   check_start(faults, join(path, "start_rate"), hinge.start_rate, " rad/s");
 }

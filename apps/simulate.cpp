@@ -421,6 +421,7 @@ void take(Run run, RunResult& r) {
   r.trajectory = std::move(run.motion);
   r.outputs = std::move(run.outputs);
   r.end = std::move(run.end);
+  r.ledger = run.ledger;
   r.prepare_seconds = run.prepare_seconds;
   r.integrate_seconds = run.integrate_seconds;
 }

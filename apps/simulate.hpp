@@ -36,13 +36,21 @@ struct OutputTable {
   Eigen::MatrixXd values;  // rows: times
 };
 
+/// Energies at the end of a run, by where they are and where they went [J].
+struct EnergyOfRun {
+  double kinetic = 0, potential = 0;  // potential: of gravity
+  double work = 0;
+  EnergyLedger ledger;
+};
+
 struct RunResult {
   Scene scene;
   std::vector<PreparedBody> bodies;
   Trajectory trajectory;
   std::shared_ptr<const Tree> tree;  // of a scene with joints: what was flown
   OutputTable outputs;
-  FlightState end;  // from which another run can go on
+  FlightState end;                    // from which another run can go on
+  std::optional<EnergyOfRun> ledger;  // of a scene with joints
   ErrorBudget budget;
   std::vector<std::string> plan;  // what was chosen and why, one line each
   std::vector<std::string> warnings;
@@ -91,6 +99,7 @@ struct Run {
   OutputTable outputs;
   FlightState end;
   std::vector<Bending> bending;  // per body
+  std::optional<EnergyOfRun> ledger;
   double prepare_seconds = 0, integrate_seconds = 0;
 
   // Of a scene with joints; the states and events of `motion` are then those of the tree, its balance is empty.

@@ -77,7 +77,7 @@ Joint joint_of(const Scene& scene, const JointScene& j) {
   joint.kind = j.kind;
   joint.a = place_of(scene, j.a);
   joint.b = place_of(scene, j.b);
-  joint.mechanism = j.mechanism;
+  joint.mechanism = j.mechanism, joint.law = j.law;
   joint.closes_loop = j.closes_loop;
   for (const CourseScene& c : j.motion) {
     const TimeFunction f = course_of(c, scene.duration).function;
@@ -232,7 +232,8 @@ FlightState end_of(const Run& run, const Scene& scene, double time, const Vector
   FlightState end = end_of(run.bodies, time, y, summary.largest);
   end.names = state_names(*run.tree);
   for (size_t i = 0; i < stops.size(); ++i)
-    if (scene.joints[i].mechanism.stop_stiffness > 0) end.stops[scene.joints[i].name] = stops[i];
+    if (scene.joints[i].mechanism.stop_stiffness > 0 || scene.joints[i].law.given())
+      end.stops[scene.joints[i].name] = stops[i];
   return end;
 }
 
@@ -268,9 +269,12 @@ IntegratorOptions options_of(const Scene& scene, const RunHooks& hooks, long max
 
 bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty(); }
 
+EnergyOfRun ledger_of(const TreeBalance& b) { return {b.kinetic, b.potential, b.work, b.ledger}; }
+
 /// What results are made of.
 void set_flown(const Scene& scene, TreeTrajectory flight, Run& r) {
   r.outputs = tree_output_table(scene, *r.tree, flight);
+  if (!flight.balance.empty()) r.ledger = ledger_of(flight.balance.back());
   r.stiffening_effect = flight.stiffening_effect;
   r.warnings = std::move(flight.warnings);
   r.motion.time = std::move(flight.time);
@@ -342,6 +346,9 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
       if (will_be_revised(scene, multibody, effect, stiffening)) return;
       Run part = r;
       TreeTrajectory rows = rows_of(so_far, told, outputs);
+      if (!so_far.laws.empty())
+        rows.laws.assign(so_far.laws.begin() + static_cast<std::ptrdiff_t>(told),
+                         so_far.laws.begin() + static_cast<std::ptrdiff_t>(outputs));
       rows.stiffening_effect = so_far.stiffening_effect, rows.warnings = so_far.warnings;
       set_flown(scene, std::move(rows), part);
       part.end = end_of(part, scene, so_far.time.back(), so_far.y.back(), so_far.summary);

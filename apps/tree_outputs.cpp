@@ -155,13 +155,16 @@ OutputTable tree_output_table(const Scene& scene, const Tree& tree, size_t rows,
 
 OutputTable tree_output_table(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) {
   const bool loads = std::any_of(scene.joints.begin(), scene.joints.end(), [](const JointScene& j) { return j.loads; });
+  const auto branches = [&](size_t row) {
+    return motion.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(motion.laws[row]);
+  };
   return tree_output_table(scene, tree, motion.time.size(), [&](size_t row) {
     const double t = motion.time[row];
     const VectorXd& y = motion.y[row];
-    return TreeMoment{
-        t, tree.unpack(y),
-        loads ? tree.joint_loads(t, y, closed_stops(tree, y)) : std::vector<JointLoad>(scene.joints.size()),
-        motion.balance[row]};
+    return TreeMoment{t, tree.unpack(y),
+                      loads ? tree.joint_loads(t, y, closed_stops(tree, y), branches(row))
+                            : std::vector<JointLoad>(scene.joints.size()),
+                      motion.balance[row]};
   });
 }
 

@@ -2,6 +2,7 @@
 
 #include "dynamics/hinge.hpp"
 #include "dynamics/joint.hpp"
+#include "dynamics/joint_law.hpp"
 #include "dynamics/time_function.hpp"
 #include "dynamics/wheel_profile.hpp"
 
@@ -41,6 +42,7 @@ struct JointScene {
   JointKind kind = JointKind::hinge;
   PlaceScene a, b;
   HingeMechanism mechanism{.rest = 0, .threshold = 0};
+  JointLaw law;
   CourseScene drive;                      // torque [N m] or force [N] along the freedom of a hinge or a slider, on b
   std::vector<CourseScene> motion;        // prescribed, one per freedom
   std::vector<double> start, start_rate;  // one per freedom [rad, rad/s] or [m, m/s]; empty: rest

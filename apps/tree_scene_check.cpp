@@ -3,6 +3,7 @@
 #include "apps/scene.hpp"
 #include "apps/scene_checks.hpp"
 #include "apps/scene_keys.hpp"
+#include "apps/scene_law.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
@@ -116,6 +117,10 @@ class TreeCheck {
     mechanism("stiffness", m.stiffness), mechanism("damping", m.damping), mechanism("stop_stiffness", m.stop_stiffness);
     check_finite(faults_, path + ".rest", m.rest);
     check_finite(faults_, path + ".threshold", m.threshold);
+    Joint with_law;
+    with_law.kind = j.kind, with_law.mechanism = m, with_law.law = j.law;
+    with_law.prescribed.resize(j.motion.size());
+    check_law(faults_, path, with_law, !j.start.empty() ? j.start[0] : m.stiffness > 0 ? m.rest : 0);
     course(path + ".drive", j.drive);
     if (j.drive.given() && !scalar)
       faults_.add(path + ".drive", fmt::format("a {} joint has none; hinges and sliders have", type.name));

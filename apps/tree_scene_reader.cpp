@@ -2,6 +2,7 @@
 
 #include "apps/scene.hpp"
 #include "apps/scene_keys.hpp"
+#include "apps/scene_law.hpp"
 
 #include <fmt/format.h>
 
@@ -161,6 +162,7 @@ JointScene read_joint(TableReader table) {
   joint.b = read_place(table, "b");
   joint.name = table.text("name", joint.b.body);
   read_mechanism(table, joint.mechanism);
+  joint.law = read_law(table);
   joint.drive = read_course(table, "drive");
   joint.motion = read_courses(table, "motion");
   joint.start = numbers(table, "start");

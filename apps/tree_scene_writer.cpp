@@ -2,6 +2,7 @@
 
 #include "apps/scene.hpp"
 #include "apps/scene_keys.hpp"
+#include "apps/scene_law.hpp"
 #include "apps/toml_writer.hpp"
 
 namespace flexboom {
@@ -52,6 +53,7 @@ void write_joint(Writer& out, const JointScene& j) {
     out.key("stop_stiffness", j.mechanism.stop_stiffness);
     out.key("threshold", j.mechanism.threshold);
   }
+  write_law(out, j.law);
   if (j.drive.given()) out.raw("drive", course(j.drive));
   if (j.motion.size() == 1) out.raw("motion", course(j.motion[0]));
   if (j.motion.size() == 2) out.raw("motion", fmt::format("[{}, {}]", course(j.motion[0]), course(j.motion[1])));

@@ -127,7 +127,7 @@ class ArkodeStepper final : public Stepper {
   void step(double t_end, double& t, Eigen::VectorXd& y, std::span<int> crossed) override {
     start_ = y;
     start_time_ = t;
-    crossings_.begin(run_.problem(), start_.data());
+    crossings_.begin(run_.problem(), start_time_, start_.data());
     const double reached = run_.step(t_end), length = reached - t;
     const auto state_at = [&](double c) { return state(start_time_ + c * length); };
     const double c = crossings_.first(run_.problem(), start_time_, length, run_.y(), state_at, crossed);

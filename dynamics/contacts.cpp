@@ -1,11 +1,19 @@
 #include "dynamics/contacts.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace flexboom {
 
 using Eigen::Vector3d;
+
+std::string_view event_name(const StopEvent& e) {
+  constexpr std::array<std::string_view, 10> names = {"",     "kink",   "engage", "disengage", "stick",
+                                                      "slip", "impact", "rest",   "leave",     "latch"};
+  if (e.kind == EventKind::stop) return e.contact ? "contact" : "release";
+  return names[static_cast<std::size_t>(e.kind)];
+}
 
 Stop stop_of(const Joint& joint, std::size_t index, const ReducedBody& beyond) {
   double inertia = beyond.m;

@@ -5,17 +5,25 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace flexboom {
 
-/// A crossing of a stop.
+/// What an event is. `stop`: touches or leaves a spring stop; others are of a JointLaw.
+enum class EventKind : char { stop, kink, engage, disengage, stick, slip, impact, rest, leave, latch };
+
+/// A crossing of a stop, or another event of a joint.
 struct StopEvent {
   double time = 0;      // [s]
   int joint = 0;        // hinge of a System, joint of other scenes
   bool contact = true;  // true: touches the stop, false: leaves it
-  double rate = 0;      // of the joint there [rad/s] or [m/s]
+  double rate = 0;      // of the joint there, before what comes of it [rad/s] or [m/s]
+  EventKind kind = EventKind::stop;
 };
+
+/// "contact", "release" or the name of the kind.
+std::string_view event_name(const StopEvent&);
 
 /// How far beyond its stop a joint is, and how fast it goes there.
 struct Gap {

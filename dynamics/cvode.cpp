@@ -50,7 +50,7 @@ class CvodeStepper final : public Stepper {
     check(CVodeSetStopTime(cvode_, t_end), "CVodeSetStopTime");
     const double start = t;
     realtype reached = t;
-    crossings_.begin(problem_, y.data());
+    crossings_.begin(problem_, start, y.data());
     const int flag = CVode(cvode_, t_end, y_.get(), &reached, CV_ONE_STEP);
     problem_.rethrow();
     check(flag, "CVode");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "dynamics/contacts.hpp"
+#include "dynamics/laws.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
 
@@ -15,11 +16,13 @@ namespace flexboom {
 /// One run: the loop around a method, whatever the coordinates. A motion says how it steps, what it records and where
 /// its stops are; the loop says when. Result: time, events and summary, and rows that the motion records.
 template <class Result>
-class Flight : protected StopMotion {
+class Flight : protected StopMotion, protected LawMotion {
  public:
-  Flight(const FlightOptions& options, const Checkpoint<Result>& so_far, std::vector<Stop> stops, std::size_t joints)
+  Flight(const FlightOptions& options, const Checkpoint<Result>& so_far, std::vector<Stop> stops, std::size_t joints,
+         Laws laws = {})
       : options_(options),
         contacts_(std::move(stops), options, joints),
+        laws_(std::move(laws)),
         outputs_(options),
         t_(options.start),
         so_far_(so_far),
@@ -44,10 +47,10 @@ class Flight : protected StopMotion {
   }
 
  protected:
-  /// The method begins at t_ and y_, with contacts_ as they are.
+  /// The method begins at t_ and y_, with contacts_ and laws_ as they are.
   virtual void restart() = 0;
-  /// One step to t and y, not beyond `limit`, and what contacts_.crossed() it ended at. Where it throws, t_ and y_
-  /// stay.
+  /// One step to t and y, not beyond `limit`, and what contacts_.crossed() and laws_.crossed() it ended at. Where it
+  /// throws, t_ and y_ stay.
   virtual void step(double limit, double& t, Eigen::VectorXd& y) = 0;
   /// States within the last step, a column each; Y may have more columns.
   virtual void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) = 0;
@@ -73,6 +76,7 @@ class Flight : protected StopMotion {
 
   const FlightOptions& options_;
   Contacts contacts_;
+  Laws laws_;
   OutputTimes outputs_;
   double t_;
   Eigen::VectorXd y_;
@@ -90,7 +94,9 @@ class Flight : protected StopMotion {
     t_ = t, y_.swap(next_y_);
     write_outputs();
     observe(y_);
-    if (contacts_.update(*this, t_, result_.events) || at_corner()) {
+    const bool met = contacts_.update(*this, t_, result_.events), changed = laws_.update(*this, t_, result_.events);
+    if (changed) observe(y_);  // sudden losses are large at once
+    if (met || changed || at_corner()) {
       restart();
       ++result_.summary.restarts;
     }
@@ -137,6 +143,7 @@ class Flight : protected StopMotion {
     if (result_.summary.interrupted && result_.time.back() < t_) record(t_, y_);
     result_.summary.seconds = seconds();
     result_.summary.stops = contacts_.histories();
+    laws_.add_histories(result_.summary.stops);
     finish();
   }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "dynamics/joint_law.hpp"
 #include "fem/stopwatch.hpp"
 
 #include <algorithm>
@@ -16,10 +17,11 @@ namespace flexboom {
 
 /// How a stop was met so far: what settling is judged by, and what a flight that goes on must know.
 struct StopHistory {
-  double largest_rate = 0;       // of its hinge or joint [rad/s] or [m/s]
-  double largest_gap = 0;        // to either side of the stop [rad] or [m]
-  double settled = -1;           // time after which it was no longer looked at [s], or -1
-  std::optional<bool> closed{};  // at the end; unknown: as gap and rate are
+  double largest_rate = 0;        // of its hinge or joint [rad/s] or [m/s]
+  double largest_gap = 0;         // to either side of the stop [rad] or [m]
+  double settled = -1;            // time after which it was no longer looked at [s], or -1
+  std::optional<bool> closed{};   // at the end; unknown: as gap and rate are
+  std::optional<LawState> law{};  // at the end; unknown: as the joint is and moves
 };
 
 /// What was not measured.

@@ -129,7 +129,8 @@ std::vector<JointLoad> joint_loads(const Multipliers& system, const MultibodySta
     if (load.drive.size() < joint.prescribed.size()) load.drive.push_back(torque.dot(turn.col(1)));
     if (p.joints[i].mechanism)
       (joint.kind == JointKind::hinge ? torque : force).z() +=
-          mechanism_load(joint.mechanism, s.coordinate[i], s.rate[i]);
+          p.joints[i].law && !s.laws.empty() ? s.laws[i].load(s.coordinate[i] - joint.mechanism.threshold, s.rate[i])
+                                             : mechanism_load(joint.mechanism, s.coordinate[i], s.rate[i]);
     load.force = turn.transpose() * force, load.torque = turn.transpose() * torque;
     loads.push_back(std::move(load));
   }

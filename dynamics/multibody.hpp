@@ -2,6 +2,7 @@
 
 #include "dynamics/gravity.hpp"
 #include "dynamics/hinge.hpp"
+#include "dynamics/joint_law.hpp"
 #include "reduction/reduced_body.hpp"
 
 #include <Eigen/Core>
@@ -44,6 +45,7 @@ struct Joint {
   HingeMechanism mechanism;  // of a hinge (about +z of a, on b) or a slider (along +z): spring, damper, stop
   std::vector<TimeFunction> prescribed;  // empty, or one per freedom: the motion is given, its torque is an output
   bool closes_loop = false;              // not part of the tree: enforced by multipliers
+  JointLaw law{};                        // beside the mechanism, of a hinge or a slider
 };
 
 /// Spring and damper along the line between two places.

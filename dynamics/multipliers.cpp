@@ -115,8 +115,9 @@ Multipliers::Multipliers(Multibody scene, std::vector<Stiffening> stiffening) : 
     JointData d{place_data(p.scene, p.stiffening, j.a), place_data(p.scene, p.stiffening, j.b), joint_rows(j)};
     require(d.a.body != d.b.body, fmt::format("joint {}: both places are on one body", j.name));
     const HingeMechanism& m = j.mechanism;
-    d.mechanism = m.stiffness != 0 || m.damping != 0 || m.stop_stiffness != 0;
-    d.stop = m.stop_stiffness > 0;
+    d.law = j.law.given();
+    d.mechanism = d.law || m.stiffness != 0 || m.damping != 0 || m.stop_stiffness != 0;
+    d.stop = m.stop_stiffness > 0 && !d.law;
     p.joints.push_back(std::move(d));
   }
   for (const SpringDamper& s : p.scene.springs)

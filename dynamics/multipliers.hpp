@@ -1,6 +1,7 @@
 #pragma once
 
 #include "dynamics/contacts.hpp"
+#include "dynamics/energy_ledger.hpp"
 #include "dynamics/multibody.hpp"
 #include "dynamics/system.hpp"
 
@@ -39,18 +40,22 @@ struct JointReaction {
 /// A moment of a motion.
 struct MultibodyState {
   std::vector<BodyState> bodies;
-  std::vector<double> coordinate, rate;  // per joint: angle of a hinge [rad], way of a slider [m]; 0 of the others
-  std::vector<JointReaction> loads;      // per joint
-  std::vector<double> spin;              // per wheel, relative to its body [rad/s]
-  double work = 0;                       // of loads, prescribed motions and wheels since the start [J]
-  double dissipated = 0;                 // by all dampers [J]
+  std::vector<double> coordinate, rate;   // per joint: angle of a hinge [rad], way of a slider [m]; 0 of the others
+  std::vector<JointReaction> loads;       // per joint
+  std::vector<double> spin;               // per wheel, relative to its body [rad/s]
+  double work = 0;                        // of loads, prescribed motions and wheels since the start [J]
+  double dissipated = 0;                  // by everything [J]
+  std::vector<std::vector<double>> lost;  // of it, per joint: by its dampers, then as law_losses; empty: it has none
+  EnergyLedger ledger;
+  std::vector<LawBranch> laws;  // per joint, or empty
   std::vector<BodyAcceleration> accelerations;
 };
 
 struct MultipliersOptions : FlightOptions {
-  std::vector<double> angles{};       // per joint: a hinge starts at the turn nearest to this [rad]; empty: to its rest
-  double dissipated = 0, work = 0;    // before the start [J]
-  std::string linear_solver = "klu";  // or "dense"
+  std::vector<double> angles{};     // per joint: a hinge starts at the turn nearest to this [rad]; empty: to its rest
+  double dissipated = 0, work = 0;  // before the start [J]; dissipated: by structures and springs, or everything
+  std::vector<std::vector<double>> lost{};  // before the start, as of MultibodyState; empty: nothing
+  std::string linear_solver = "klu";        // or "dense"
 };
 
 struct MultipliersSummary {

@@ -34,6 +34,11 @@ Equations::Equations(const Prepared& prepared) : prepared_(prepared), scene_(pre
     constexpr double slow = 10;  // [rad/s]
     inverse_metric_.segment(at + 6, places_[i].n) = (b.Me.diagonal() + b.Ke.diagonal() / (slow * slow)).cwiseInverse();
   }
+  energies_ = 2;
+  for (const JointData& j : joints_) {
+    losses_.push_back(j.mechanism ? energies_ : -1);
+    if (j.mechanism) energies_ += 1 + (j.law ? static_cast<int>(law_losses.size()) : 0);
+  }
   for (const JointData& j : joints_) all_rows_ += static_cast<int>(j.rows.size());
   keep_rows(std::vector<char>(static_cast<size_t>(all_rows_), 1));
   scratch_ = std::make_unique<EquationScratch>(prepared.bodies);
@@ -51,8 +56,14 @@ void Equations::keep_rows(const std::vector<char>& kept) {
       r.mu = r.kept ? size_++ : -1;
     }
   for (BodyPlaces& b : places_) b.nu = size_++;
-  work_ = size_++;
-  dissipated_ = size_++;
+  work_ = size_;
+  size_ += energies_;
+}
+
+int Equations::holding(size_t joint) const {
+  const JointData& j = joints_[joint];
+  const auto row = std::ranges::find_if(j.rows, [&](const Row& r) { return r.holds && r.kept && j.held_at; });
+  return row == j.rows.end() ? -1 : row->lambda;
 }
 
 VectorXd Equations::pack(const std::vector<BodyState>& states) const {
@@ -110,6 +121,7 @@ PairMotion<double> Equations::pair(const JointData& j, double t, const double* y
   if (joint != nullptr)
     for (size_t i = 0; i < joint->prescribed.size(); ++i)
       x.drive[i] = {joint->prescribed[i].value(t), joint->prescribed[i].rate(t)};
+  if (joint != nullptr && j.held_at) x.drive[0] = {*j.held_at, 0};
   return x;
 }
 
@@ -208,9 +220,15 @@ void Equations::residual(double t, const double* y, const double* y_dot, const J
     PairForces<double> forces, correction;
     std::array<double, 6> g{}, g_dot{};
     constrain(j, x, a, b, multipliers(j, y), g.data(), g_dot.data(), forces, &correction, power);
-    if (j.mechanism)
-      act_mechanism(j, joint.mechanism, joint.kind == JointKind::hinge, memory.closed[i], memory.near[i], x, a, b,
-                    forces, loss);
+    if (j.mechanism) {
+      const MechanismState state = memory.of(i);
+      double in_joint = 0;
+      const DriveMotion<double> c =
+          act_mechanism(j, joint.mechanism, joint.kind == JointKind::hinge, state, x, a, b, forces, in_joint);
+      F[losses(i)] = y_dot[losses(i)] - in_joint;
+      for (int k = 0; j.law && k < static_cast<int>(law_losses.size()); ++k)
+        F[losses(i) + 1 + k] = y_dot[losses(i) + 1 + k] - state.law.power(static_cast<LawLoss>(k), c.value, c.rate);
+    }
     for (size_t k = 0; k < j.rows.size(); ++k)
       if (j.rows[k].kept) F[j.rows[k].mu] = g[k], F[j.rows[k].lambda] = g_dot[k];
     scatter(j.a, forces.a, y, F);
@@ -253,7 +271,7 @@ void Equations::residual(double t, const double* y, const double* y_dot, const J
     loss += u.dot(prepared_.bodies[i].De.lazyProduct(u));
   }
   F[work_] = y_dot[work_] - power;
-  F[dissipated_] = y_dot[dissipated_] - loss;
+  F[dissipated()] = y_dot[dissipated()] - loss;
 }
 
 void Equations::row_violations(double t, const double* y, double* g, double* g_dot) const {
@@ -297,27 +315,45 @@ std::vector<JointReaction> Equations::loads(double t, const double* y) {
   return loads;
 }
 
-double Equations::potential(const double* y, const JointMemory& memory) const {
-  double energy = 0;
+EnergyLedger Equations::ledger(const double* y, const JointMemory& memory) const {
+  EnergyLedger e;
   for (size_t i = 0; i < joints_.size(); ++i) {
     if (!joints_[i].mechanism) continue;
-    energy += flexboom::energy(scene_.joints[i].mechanism, gap(i, y, memory.near[i]).value);
+    const Joint& joint = scene_.joints[i];
+    const double x = gap(i, y, memory.near[i]).value;
+    if (joints_[i].law) {
+      const LawModel law(joint);
+      e.springs += law.spring_energy(x), e.stops += law.stop_energy(x);
+      for (size_t k = 0; k < law_losses.size(); ++k) e.laws[k] += y[losses(i) + 1 + static_cast<int>(k)];
+    } else {
+      const double in_stop = energy({.stop_stiffness = joint.mechanism.stop_stiffness}, x);
+      e.springs += energy(joint.mechanism, x) - in_stop, e.stops += in_stop;
+    }
+    e.dampers += y[losses(i)];
   }
   for (size_t i = 0; i < scene_.springs.size(); ++i) {
     const JointData& j = prepared_.springs[i];
     const PairMotion<double> x = pair(j, 0, y, nullptr);
     const Vec3<double> d = place_motion(j.b, x.frame_b, x.elastic_b).r - place_motion(j.a, x.frame_a, x.elastic_a).r;
     const double stretch = std::sqrt(dot(d, d)) - scene_.springs[i].free_length;
-    energy += 0.5 * scene_.springs[i].stiffness * stretch * stretch;
+    e.springs += 0.5 * scene_.springs[i].stiffness * stretch * stretch;
   }
   for (size_t i = 0; i < places_.size(); ++i) {
+    const Map<const VectorXd> q(y + places_[i].q, places_[i].n);
+    if (places_[i].n > 0) e.structures += 0.5 * q.dot(scene_.bodies[i].Ke * q);
+  }
+  e.elsewhere = y[dissipated()];
+  return e;
+}
+
+double Equations::potential(const double* y, const JointMemory& memory) const {
+  double energy = ledger(y, memory).stored();
+  for (size_t i = 0; i < places_.size(); ++i) {
     const BodyPlaces& at = places_[i];
-    const ReducedBody& body = scene_.bodies[i];
-    const Map<const VectorXd> q(y + at.q, at.n);
-    if (at.n > 0) energy += 0.5 * q.dot(body.Ke * q);
     DeformedBody<double>& deformed = scratch_->bodies[i].deformed;
-    deform(prepared_.bodies[i], q.data(), deformed);
-    energy -= scene_.gravity.dot(body.m * Map<const Vector3d>(y + at.R) + eigen(rotation(y + at.p) * deformed.mc));
+    deform(prepared_.bodies[i], y + at.q, deformed);
+    energy -= scene_.gravity.dot(scene_.bodies[i].m * Map<const Vector3d>(y + at.R) +
+                                 eigen(rotation(y + at.p) * deformed.mc));
   }
   return energy;
 }

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -61,10 +62,16 @@ struct BodyPlaces {
   int R = 0, p = 0, q = 0, v = 0, w = 0, u = 0, n = 0, nu = 0, freedom = 0;
 };
 
-/// State of the events: which stops are closed; the gaps (angle less threshold) near which hinges are.
+/// State of the events: which stops are closed; the gaps (angle less threshold) near which hinges are; in what state
+/// laws are.
 struct JointMemory {
   std::vector<char> closed;
   std::vector<double> near;
+  std::vector<LawBranch> laws;  // empty: no joint has one
+
+  MechanismState of(size_t joint) const {
+    return {closed[joint] != 0, near[joint], laws.empty() ? LawBranch{} : laws[joint]};
+  }
 };
 
 struct EquationScratch;
@@ -83,9 +90,18 @@ class Equations {
   int motion() const { return motion_; }                               // y begins with this much of bodies and wheels
   int wheel(size_t i) const { return wheels_ + static_cast<int>(i); }  // axial angular momentum [N m s]
   int work() const { return work_; }                                   // of loads, prescribed motions and wheels [J]
-  int dissipated() const { return dissipated_; }                       // by all dampers [J]
+  /// By structures and springs, behind work [J]; then by the mechanism of each joint that has one, and by its law
+  /// (law_losses), see losses. These energies are the end of y.
+  int dissipated() const { return work_ + 1; }
+  int losses(size_t joint) const { return losses_[joint] < 0 ? -1 : work_ + losses_[joint]; }
+  int energies() const { return energies_; }
   int freedoms() const { return freedoms_; }
   int all_rows() const { return all_rows_; }  // kept or not
+
+  /// Holds a joint by its law there (angle [rad] or way [m]), or no more. Rows must be chosen anew then.
+  void hold(size_t joint, std::optional<double> at) { joints_[joint].held_at = at; }
+  /// The multiplier of the row that holds a joint; -1 where the other rows hold it.
+  int holding(size_t joint) const;
 
   /// Keeps these rows (one flag per row of all joints) and numbers the unknowns anew.
   void keep_rows(const std::vector<char>&);
@@ -125,6 +141,8 @@ class Equations {
   std::vector<JointReaction> loads(double t, const double* y);
   /// Potential energy of mechanisms, springs, bodies and gravity.
   double potential(const double* y, const JointMemory&) const;
+  /// Of mechanisms, springs and bodies, and what was lost.
+  EnergyLedger ledger(const double* y, const JointMemory&) const;
   /// Motion of the two places of a joint at time t.
   PairMotion<double> pair(const JointData&, double t, const double* y, const Joint*) const;
 
@@ -146,13 +164,15 @@ class Equations {
   /// are of the size of the orbital rate squared.
   double pull_by_field(size_t i, double t, const double* y, double* F) const;
   void body_newton(size_t i, double t, double c, const double* y, const double* y_dot, PatternSum&);
-  void pair_newton(const JointData&, const Eigen::MatrixXd& derivatives, bool velocities, const double* y, PatternSum&);
+  void pair_newton(const JointData&, const Eigen::MatrixXd& derivatives, bool velocities, int loss, const double* y,
+                   PatternSum&);
 
   const Prepared& prepared_;
   const Multibody& scene_;
   std::vector<JointData> joints_;
   std::vector<BodyPlaces> places_;
-  int size_ = 0, motion_ = 0, wheels_ = 0, work_ = 0, dissipated_ = 0, freedoms_ = 0, all_rows_ = 0;
+  int size_ = 0, motion_ = 0, wheels_ = 0, work_ = 0, energies_ = 0, freedoms_ = 0, all_rows_ = 0;
+  std::vector<int> losses_;  // per joint, from work on; -1: it has none
   Eigen::VectorXd inverse_metric_;
   std::unique_ptr<EquationScratch> scratch_;
 };

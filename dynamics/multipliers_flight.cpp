@@ -41,12 +41,13 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
  public:
   MultipliersFlight(const Multipliers& system, Equations& equations, const std::vector<BodyState>& start,
                     const MultipliersOptions& options, const Checkpoint<MultibodyTrajectory>& so_far)
-      : Flight(options, so_far, stops_of(equations), system.multibody().joints.size()),
+      : Flight(options, so_far, stops_of(equations), system.multibody().joints.size(),
+               Laws(system.multibody().joints, options, 1e-15)),
         equations_(equations),
         scene_(system.multibody()),
         options_(options) {
     const size_t joints = scene_.joints.size();
-    memory_ = {std::vector<char>(joints, 0), std::vector<double>(joints, 0.0)};
+    memory_ = {std::vector<char>(joints, 0), std::vector<double>(joints, 0.0), {}};
     check_sizes(start);
     frame_ = std::make_unique<FlightFrame>(equations_, start, t_);
     start_on_constraints(frame_->seen(start));
@@ -56,16 +57,31 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     scales_ = std::make_unique<StateScales>(
         equations_, y_, y_dot_, std::max(std::abs(b.kinetic) + std::abs(b.elastic), options_.largest.energy),
         local_share * options.tolerance, options.duration);
-    record_pattern();
-    ida_ = std::make_unique<Ida>(*this, options.linear_solver);
+    make_method();
   }
 
  private:
+  /// For the unknowns as they are numbered.
+  void make_method() {
+    if (ida_) add(ida_->counts(), past_);
+    assembly_ = {};
+    if (y_dot_.size() != y_.size()) equations_.make_consistent(t_, y_, y_dot_, memory_);
+    record_pattern();
+    ida_ = std::make_unique<Ida>(*this, options_.linear_solver);
+    renumbered_ = false;
+  }
+
+  static void add(const DaeCounts& c, DaeCounts& to) {
+    to.steps += c.steps, to.residual_evaluations += c.residual_evaluations, to.factorisations += c.factorisations;
+    to.newton_iterations += c.newton_iterations, to.error_test_failures += c.error_test_failures;
+    to.convergence_failures += c.convergence_failures;
+  }
+
   int size() const override { return equations_.size(); }
   VectorXd differential() const override {
     VectorXd id = VectorXd::Zero(size());
     id.head(equations_.motion()).setOnes();
-    id[equations_.work()] = id[equations_.dissipated()] = 1;
+    id.tail(equations_.energies()).setOnes();
     return id;
   }
   void residual(double t, const double* y, const double* y_dot, double* F) override {
@@ -78,8 +94,8 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   std::span<const int> column_starts() const override { return assembly_.starts(); }
   std::span<const int> rows() const override { return assembly_.rows(); }
   void weights(double* w) const override { scales_->weights(w); }
-  int roots() const override { return static_cast<int>(contacts_.size()); }
-  void root_values(double, const double* y, double* values) override {
+  int roots() const override { return static_cast<int>(contacts_.size() + laws_.switches().size()); }
+  void root_values(double t, const double* y, double* values) override {
     // Round-off of a gap must not look like a crossing: it counts as on the side of the flag.
     constexpr double round_off = 2e-16;
     for (size_t i = 0; i < contacts_.size(); ++i) {
@@ -87,6 +103,53 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       const double side = contacts_.closed()[i] ? round_off : -round_off;
       values[i] = !contacts_.armed()[i] ? 1.0 : std::abs(g) <= round_off ? side : g;
     }
+    Consistent at(*this, t, y);
+    for (size_t i = 0; i < laws_.switches().size(); ++i) {
+      const double side = laws_.sides()[i] ? round_off : -round_off;
+      const double g = laws_.armed()[i] ? switch_gap(laws_.switches()[i], at, y, false).value : 1.0;
+      values[contacts_.size() + i] = std::abs(g) <= round_off_of(laws_.switches()[i]) ? side : g;
+    }
+  }
+
+  /// Where nothing else keeps a gap off zero after its crossing.
+  static double round_off_of(const LawSwitch& s) {
+    using Kind = LawSwitch::Kind;
+    return s.kind == Kind::ramp || s.kind == Kind::latch || s.kind == Kind::faster ? 1e-14 : 1e-300;
+  }
+
+  /// Accelerations and multipliers at a state of the method; found when they are asked for.
+  struct Consistent {
+    MultipliersFlight& flight;
+    double t;
+    VectorXd y, y_dot;
+
+    Consistent(MultipliersFlight& of, double time, const double* state)
+        : flight(of), t(time), y(Eigen::Map<const VectorXd>(state, of.size())) {}
+    void find() {
+      if (y_dot.size() == 0) flight.equations_.make_consistent(t, y, y_dot, flight.memory_);
+    }
+    double hold(size_t joint) {
+      find();
+      const int row = flight.equations_.holding(joint);
+      return row < 0 ? 0 : y[row];
+    }
+    double acceleration(size_t joint) {  // by the change of the rate over a short time
+      constexpr double h = 1e-7;
+      find();
+      const auto rate = [&](double dt) {
+        return flight.equations_.gap(joint, (y + dt * y_dot).eval().data(), flight.memory_.near[joint]).rate;
+      };
+      return (rate(h) - rate(-h)) / (2 * h);
+    }
+  };
+
+  Gap switch_gap(const LawSwitch& s, Consistent& at, const double* y, bool slopes) {
+    const size_t joint = laws_.joint_of(s);
+    const DriveMotion<double> c = equations_.gap(joint, y, memory_.near[joint]);
+    LawPoint p{c.value, c.rate};
+    if (Laws::needs_hold(s)) p.hold = at.hold(joint);
+    if (slopes && Laws::needs_acceleration(s)) p.acceleration = at.acceleration(joint);
+    return laws_.gap(s, p);
   }
 
   DriveMotion<double> gap(size_t stop, const double* y) {
@@ -110,6 +173,69 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
                  after = gap(stop, (y + h * y_dot).eval().data()).rate;
     return {(after - before) / (2 * h), 0};
   }
+
+  Gap joint_way(size_t joint) override {
+    const DriveMotion<double> c = equations_.gap(joint, y_.data(), memory_.near[joint]);
+    return {c.value, c.rate};
+  }
+  double joint_acceleration(size_t joint) override { return Consistent(*this, t_, y_.data()).acceleration(joint); }
+  double hold_load(size_t joint) override { return Consistent(*this, t_, y_.data()).hold(joint); }
+  void lose(size_t joint, LawLoss loss, double energy) override {
+    y_[equations_.losses(joint) + 1 + static_cast<int>(loss)] += energy;
+  }
+
+  /// A joint that is held has a row more, or one less when it is let go.
+  void take_branches() override {
+    memory_.laws.assign(laws_.branches().begin(), laws_.branches().end());
+    bool other_rows = false;
+    for (size_t i = 0; i < laws_.size(); ++i) {
+      const size_t joint = laws_.joint(i);
+      const bool held = memory_.laws[joint].held;
+      if (held == equations_.joints()[joint].held_at.has_value()) continue;
+      const double at = joint_way(joint).value + scene_.joints[joint].mechanism.threshold;
+      equations_.hold(joint, held ? std::optional(at) : std::nullopt);
+      other_rows = true;
+    }
+    if (other_rows) choose_rows();
+  }
+
+  /// Numbers the unknowns anew; IDA, where there is one, starts with them again.
+  void choose_rows() {
+    const VectorXd motion = y_.head(equations_.motion()), energies = y_.tail(equations_.energies());
+    const RankReport rank = constraint_rank(equations_, t_, y_.data());
+    margin_ = rank.margin;
+    equations_.keep_rows(rank.kept);
+    y_ = VectorXd::Zero(equations_.size());
+    y_.head(motion.size()) = motion, y_.tail(energies.size()) = energies;
+    renumbered_ = true;
+  }
+
+  /// Everything is affine in a load: what a load makes of accelerations, an impulse makes of rates. The load is as
+  /// large as the others, else its part were round-off.
+  void prepare_blow(size_t joint) override {
+    Consistent before(*this, t_, y_.data());
+    before.find();
+    const double others = before.y_dot.head(equations_.motion()).cwiseAbs().maxCoeff();
+    double load = 1;
+    for (int round = 0; round < 2; ++round) {
+      memory_.laws[joint].spring = laws_.branches()[joint].spring + load;
+      Consistent after(*this, t_, y_.data());
+      after.find();
+      memory_.laws[joint].spring = laws_.branches()[joint].spring;
+      blow_ = (after.y_dot - before.y_dot) / load;
+      held_blow_ = (after.y - before.y) / load;
+      load = 1e3 * (1 + others) / std::abs(rate_of_blow(joint));
+    }
+  }
+  double rate_of_blow(size_t joint) override {  // rates are linear in the velocities
+    const VectorXd after = y_ + blow_;
+    return equations_.gap(joint, after.data(), memory_.near[joint]).rate - joint_way(joint).rate;
+  }
+  double hold_of_blow(size_t joint) override {
+    const int row = equations_.holding(joint);
+    return row < 0 ? 0 : held_blow_[row];
+  }
+  void strike(double impulse) override { y_ += impulse * blow_; }
 
   double noise(size_t stop) const override {
     constexpr double of_steps = 3, round_off = 1e-14;
@@ -143,6 +269,9 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     equations_.keep_rows(rank.kept);
     y_ = equations_.pack(start);
     y_[equations_.dissipated()] = options_.dissipated, y_[equations_.work()] = options_.work;
+    for (size_t i = 0; i < options_.lost.size(); ++i)
+      for (size_t k = 0; k < options_.lost[i].size(); ++k)
+        y_[equations_.losses(i) + static_cast<int>(k)] = options_.lost[i][k];
     equations_.project(t_, y_);
     equations_.row_values(t_, y_.data(), values);
     require_closed(violation(equations_, values.g_dot), "m/s", "rad/s",
@@ -168,6 +297,9 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     follow_turns();
     contacts_.begin(*this);
     set_closed(contacts_.closed(), memory_);
+    if (laws_.empty()) return;
+    laws_.begin(*this, t_, result_.events);
+    equations_.project(t_, y_);
   }
 
   void follow_turns() {
@@ -183,6 +315,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
 
   void restart() override {
     set_closed(contacts_.closed(), memory_);
+    if (renumbered_) make_method();
     if (t_ > options_.start) {
       equations_.project(t_, y_);
       equations_.make_consistent(t_, y_, y_dot_, memory_);
@@ -191,24 +324,31 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   }
 
   void step(double limit, double& t, VectorXd& y) override {
-    before_.resize(contacts_.size());
+    before_.resize(static_cast<size_t>(roots()));
     for (size_t i = 0; i < contacts_.size(); ++i) before_[i] = clearance(i, y);
+    for (size_t i = 0; i < laws_.switches().size(); ++i) before_[contacts_.size() + i] = switch_clearance(i, y);
     const double t0 = t;
     std::vector<int>& crossed = contacts_.crossed();
+    crossed_.assign(static_cast<size_t>(roots()), 0);
     try {
-      ida_->step(limit, t, y, crossed);
+      ida_->step(limit, t, y, crossed_);
+      std::copy_n(crossed_.begin(), crossed.size(), crossed.begin());
     } catch (const NumericalError& error) {
       if (constraint_rank(equations_, t, y.data()).margin < 3e-2 * margin_) throw_locked(t, y);
       const std::string body = body_without_inertia(equations_, t, y.data());
       if (!body.empty()) throw NumericalError(fmt::format("t = {:.9g} s: {}", t, body));
       throw;
     }
-    if (std::ranges::all_of(crossed, [](int c) { return c == 0; })) find_short_contacts(t0, t, y);
+    if (std::ranges::all_of(crossed_, [](int c) { return c == 0; })) find_short_contacts(t0, t, y);
     // Only a crossing away from where the flag is counts: the state may lie a rounding error behind the stop.
     for (size_t i = 0; i < contacts_.size(); ++i) {
       const double rate = gap(i, y.data()).rate;
       const bool counts = crossed[i] != 0 && (contacts_.closed()[i] ? rate < 0 : rate > 0);
       crossed[i] = !counts ? 0 : contacts_.closed()[i] ? -1 : 1;
+    }
+    for (size_t i = 0; i < laws_.switches().size(); ++i) {
+      const int direction = crossed_[contacts_.size() + i], away = laws_.sides()[i] ? -1 : 1;
+      laws_.crossed()[i] = laws_.armed()[i] && direction == away ? away : 0;
     }
     watch_constraints(t, y);
   }
@@ -244,20 +384,34 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     return {0, side * g.value, side * g.rate};
   }
 
+  /// Of a switch that goes by the way alone; others have no short crossings worth looking for.
+  Clearance switch_clearance(size_t i, const VectorXd& y) {
+    const LawSwitch& s = laws_.switches()[i];
+    if (!laws_.armed()[i] || Laws::needs_hold(s) || Laws::needs_acceleration(s)) return {0, 1, 0};
+    Consistent unused(*this, 0, y.data());
+    const Gap g = switch_gap(s, unused, y.data(), false);
+    const double side = laws_.sides()[i] ? 1 : -1;
+    return {0, side * g.value, side * g.rate};
+  }
+
   /// IDA looks at the signs at both ends of a step: a contact that begins and ends within it is found here.
   void find_short_contacts(double t0, double& t, VectorXd& y) {
     const double length = t - t0;
     double first = length;
-    std::vector<int>& crossed = contacts_.crossed();
-    for (size_t i = 0; i < contacts_.size(); ++i) {
-      if (!contacts_.armed()[i] || !(before_[i].slope < 0)) continue;
-      Clearance to = clearance(i, y);
+    for (size_t i = 0; i < before_.size(); ++i) {
+      const bool of_law = i >= contacts_.size();
+      const size_t k = of_law ? i - contacts_.size() : i;
+      const auto clear = [&](const VectorXd& state) {
+        return of_law ? switch_clearance(k, state) : clearance(k, state);
+      };
+      if (!(of_law ? laws_.armed()[k] : contacts_.armed()[k]) || !(before_[i].slope < 0)) continue;
+      Clearance to = clear(y);
       to.c = length;
       if (!(to.slope > 0) || to.value < 0) continue;
       const auto at = [&](double c) {
         sample_.resize(size());
         ida_->interpolate(t0 + c, sample_);
-        Clearance here = clearance(i, sample_);
+        Clearance here = clear(sample_);
         here.c = c;
         return here;
       };
@@ -265,11 +419,12 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       // At round-off of the gap it may be no crossing to those who look at the rate: then the step ends where it ended,
       // for the next one starts there.
       if (root >= first || !(at(root).slope < 0)) continue;
-      std::ranges::fill(crossed, 0);
-      crossed[i] = contacts_.closed()[i] ? -1 : 1;
+      std::ranges::fill(crossed_, 0);
+      crossed_[i] = (of_law ? laws_.sides()[k] : contacts_.closed()[k]) ? -1 : 1;
       first = root;
     }
     if (first == length) return;
+    std::copy_n(crossed_.begin(), contacts_.size(), contacts_.crossed().begin());
     t = t0 + first;
     ida_->interpolate(t, y);
   }
@@ -309,7 +464,13 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       const ReactionWheel& w = scene_.wheels[i];
       s.spin.push_back(y[equations_.wheel(i)] / w.inertia - w.axis.dot(s.bodies[static_cast<size_t>(w.body)].omega));
     }
-    s.work = y[equations_.work()], s.dissipated = y[equations_.dissipated()];
+    s.ledger = equations_.ledger(y.data(), memory_);
+    s.work = y[equations_.work()], s.dissipated = s.ledger.lost();
+    s.lost.resize(scene_.joints.size());
+    for (size_t i = 0; i < scene_.joints.size(); ++i)
+      if (const int first = equations_.losses(i); first >= 0)
+        s.lost[i].assign(y.data() + first, y.data() + first + 1 + (equations_.joints()[i].law ? law_losses.size() : 0));
+    s.laws = memory_.laws;
     Balance balance = balance_of(equations_, y, memory_);
     frame_->leave(t, s, balance);
     result_.time.push_back(t);
@@ -319,7 +480,8 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
 
   void finish() override {
     MultipliersSummary& s = result_.summary;
-    const DaeCounts c = ida_->counts();
+    DaeCounts c = past_;
+    add(ida_->counts(), c);
     s.steps = c.steps, s.residual_evaluations = c.residual_evaluations, s.factorisations = c.factorisations;
     s.newton_iterations = c.newton_iterations, s.error_test_failures = c.error_test_failures;
     s.convergence_failures = c.convergence_failures;
@@ -331,8 +493,12 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   const MultipliersOptions& options_;
   double margin_ = 1;
   JointMemory memory_;
-  std::vector<Clearance> before_;  // of the stops, before the step
+  std::vector<Clearance> before_;  // of the stops and switches, before the step
+  std::vector<int> crossed_;       // the same
+  bool renumbered_ = false;
+  DaeCounts past_;
   VectorXd y_dot_, sample_, rows_, rates_;
+  VectorXd blow_, held_blow_;  // changes of the state and of multipliers per impulse
   redundant::PatternSum assembly_;
   std::unique_ptr<FlightFrame> frame_;
   std::unique_ptr<StateScales> scales_;

@@ -53,6 +53,10 @@ std::vector<Row> joint_rows(const Joint& joint) {
   for (const KindRows& k : table()) {
     if (k.kind != joint.kind) continue;
     std::vector<Row> rows = k.held;
+    if (joint.law.given() && LawModel(joint).can_hold()) {
+      rows.push_back(k.driven.front());
+      rows.back().holds = true;
+    }
     if (joint.prescribed.empty()) return rows;
     require(!k.driven.empty(),
             fmt::format("joint \"{}\": the motion of a {} joint can not be prescribed; of a hinge, slider or universal "

@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <type_traits>
 #include <vector>
 
@@ -23,13 +24,17 @@ struct Row {
   size_t freedom = 0;        // which prescribed function drives it
   const char* what = "";     // for messages
   bool kept = true;          // false: redundant, left out
+  bool holds = false;        // only there while the joint's law holds it
   int lambda = -1, mu = -1;  // unknowns of a kept row
 };
 
 struct JointData {
   PlaceData a, b;
   std::vector<Row> rows;
-  bool mechanism = false, stop = false;
+  bool mechanism = false, stop = false, law = false;
+  std::optional<double> held_at{};  // by its law: angle [rad] or way [m]
+
+  bool is_there(const Row& row) const { return !row.holds || held_at; }
 };
 
 /// The rows of each kind of joint, prescribed freedoms included.
@@ -125,6 +130,10 @@ void constrain(const JointData& joint, const PairMotion<T>& x, const PlaceMotion
   Vec3<T> force{}, torque{}, mu_force{}, mu_torque{};
   for (size_t i = 0; i < joint.rows.size(); ++i) {
     const Row& row = joint.rows[i];
+    if (!joint.is_there(row)) {
+      g[i] = g_dot[i] = T(0.0);
+      continue;
+    }
     const RowVectors<T> v = row_vectors(row, a, b, x.drive);
     if (row.kind == Row::Kind::along) {
       g[i] = dot(v.e, d) - v.shift;
@@ -169,17 +178,31 @@ DriveMotion<T> joint_gap(bool hinge, double threshold, const PlaceMotion<T>& a, 
   return {angle, dot(z, b.omega - a.omega)};
 }
 
-/// Spring, damper and stop of a hinge or slider; adds what the damper takes.
+/// In what state the mechanism or the law of a joint is.
+struct MechanismState {
+  bool contact = false;
+  double near = 0;  // gap near which the hinge is [rad]
+  LawBranch law{};
+};
+
+/// Spring, damper and stop of a hinge or slider, or its law; adds what the damper takes. Returns the gap.
 template <class T>
-void act_mechanism(const JointData& joint, const HingeMechanism& m, bool hinge, bool contact, double near,
-                   const PairMotion<T>& x, const PlaceMotion<T>& a, const PlaceMotion<T>& b, PairForces<T>& out,
-                   T& loss) {
-  const DriveMotion<T> c = joint_gap(hinge, m.threshold, a, b, near);
-  T push = m.stiffness * ((m.rest - m.threshold) - c.value) - m.damping * c.rate;
-  if (contact) push -= m.stop_stiffness * c.value;
+DriveMotion<T> act_mechanism(const JointData& joint, const HingeMechanism& m, bool hinge, const MechanismState& state,
+                             const PairMotion<T>& x, const PlaceMotion<T>& a, const PlaceMotion<T>& b,
+                             PairForces<T>& out, T& loss) {
+  const DriveMotion<T> c = joint_gap(hinge, m.threshold, a, b, state.near);
+  T push;
+  if (joint.law) {
+    push = state.law.load(c.value, c.rate);
+    loss += state.law.damper_power(c.rate);
+  } else {
+    push = m.stiffness * ((m.rest - m.threshold) - c.value) - m.damping * c.rate;
+    if (state.contact) push -= m.stop_stiffness * c.value;
+    loss += m.damping * (c.rate * c.rate);
+  }
   const Vec3<T> along = push * Vec3<T>{a.axes.row[0].z, a.axes.row[1].z, a.axes.row[2].z};
   add_pair(joint, x, a, b, hinge ? Vec3<T>{} : along, hinge ? along : Vec3<T>{}, out);
-  loss += m.damping * (c.rate * c.rate);
+  return c;
 }
 
 /// Spring and damper along the line between the places; adds what the damper takes.

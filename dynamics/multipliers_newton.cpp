@@ -269,10 +269,11 @@ void Equations::body_newton(size_t i, double t, double c, const double* y, const
     out.add_block(work_, at.w, torque * wheel_k.axis.transpose());
   }
   out.add_block(at.v, at.v, V);
-  if (n > 0) out.add_block(dissipated_, at.u, -2 * Map<const VectorXd>(y + at.u, n).transpose() * body.De);
+  if (n > 0) out.add_block(dissipated(), at.u, -2 * Map<const VectorXd>(y + at.u, n).transpose() * body.De);
 }
 
-void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velocities, const double* y, PatternSum& out) {
+void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velocities, int loss, const double* y,
+                            PatternSum& out) {
   const Index m = static_cast<Index>(j.rows.size());
   const std::array<const PlaceData*, 2> sides = {&j.a, &j.b};
   for (size_t side = 0; side < 2; ++side) {
@@ -299,7 +300,7 @@ void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velociti
       out.add_block(on.v, at.R, MatrixXd(-T * of_positions.middleRows(row, 12)));
       if (velocities) out.add_block(on.v, at.v, MatrixXd(-T * of_velocities.middleRows(row, 12)));
     }
-    for (const auto& [energy, row] : {std::pair(work_, 24 + 2 * m), std::pair(dissipated_, 25 + 2 * m)}) {
+    for (const auto& [energy, row] : {std::pair(work_, 24 + 2 * m), std::pair(loss, 25 + 2 * m)}) {
       out.add_block(energy, at.R, -of_positions.row(row));
       if (velocities) out.add_block(energy, at.v, -of_velocities.row(row));
     }
@@ -330,21 +331,20 @@ void Equations::newton(double t, double c, const double* y, const double* y_dot,
     if (j.rows.empty() && !j.mechanism) continue;
     const Joint& joint = scene_.joints[i];
     const RowMultipliers of = multipliers(j, y);
-    const bool damped = j.mechanism && joint.mechanism.damping != 0;
+    const bool damped = j.law || (j.mechanism && joint.mechanism.damping != 0);
     const MatrixXd L = pair_derivatives(j, pair(j, t, y, &joint), damped, [&](const PairMotion<Lanes>& x) {
       const PlaceMotion<Lanes> a = place_motion(j.a, x.frame_a, x.elastic_a),
                                b = place_motion(j.b, x.frame_b, x.elastic_b);
       PairResult r;
       constrain(j, x, a, b, of, r.g.data(), r.g_dot.data(), r.forces, nullptr, r.power);
       if (j.mechanism)
-        act_mechanism(j, joint.mechanism, joint.kind == JointKind::hinge, memory.closed[i], memory.near[i], x, a, b,
-                      r.forces, r.loss);
+        act_mechanism(j, joint.mechanism, joint.kind == JointKind::hinge, memory.of(i), x, a, b, r.forces, r.loss);
       return r;
     });
-    pair_newton(j, L, damped, y, out);
+    pair_newton(j, L, damped, j.mechanism ? losses(i) : dissipated(), y, out);
     const PairMotion<double> now = pair(j, t, y, &joint);
     for (const Row& r : j.rows)
-      if (r.kept && r.drive != Row::Drive::none)
+      if (r.kept && !r.holds && r.drive != Row::Drive::none)
         out.add(work_, r.lambda,
                 -row_vectors(r, place_motion(j.a, now.frame_a, now.elastic_a),
                              place_motion(j.b, now.frame_b, now.elastic_b), now.drive)
@@ -359,7 +359,7 @@ void Equations::newton(double t, double c, const double* y, const double* y_dot,
                  place_motion(j.b, x.frame_b, x.elastic_b), r.forces, r.loss);
       return r;
     });
-    pair_newton(j, L, damped, y, out);
+    pair_newton(j, L, damped, dissipated(), y, out);
   }
   for (size_t i = 0; i < scene_.loads.size(); ++i) {
     JointData j;
@@ -375,9 +375,9 @@ void Equations::newton(double t, double c, const double* y, const double* y_dot,
       r.power = dot(force, b.r_dot) + dot(torque, b.omega);
       return r;
     });
-    pair_newton(j, L, true, y, out);
+    pair_newton(j, L, true, dissipated(), y, out);
   }
-  for (const int energy : {work_, dissipated_}) out.add(energy, energy, c);
+  for (int energy = work_; energy < size_; ++energy) out.add(energy, energy, c);
 }
 
 MatrixXd Equations::gradient(double t, const double* y) {

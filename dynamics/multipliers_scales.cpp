@@ -42,8 +42,8 @@ StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorX
                          double tolerance, double duration)
     : equations_(equations), tolerance_(tolerance), start_(y0) {
   constexpr double part = 1e-3;
-  scale_ = VectorXd::Constant(y0.size(), 1e100);
-  least_ = VectorXd::Zero(y0.size());
+  scale_ = VectorXd::Constant(equations.motion() + equations.energies(), 1e100);
+  least_ = VectorXd::Zero(scale_.size());
   const double time = std::min(1.0, 0.01 * duration), E = energy_scale(equations, energy, y0_dot, time);
   const auto& places = equations.places();
   for (const JointData& j : equations.joints())
@@ -74,7 +74,7 @@ StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorX
     scale_[equations.wheel(i)] =
         std::max({part * std::sqrt(2 * E * wheel.inertia), std::abs(y0[equations.wheel(i)]), 1e-30});
   }
-  scale_[equations.work()] = scale_[equations.dissipated()] = E;
+  scale_.tail(equations.energies()).setConstant(E);
   observe(y0);
 }
 
@@ -118,11 +118,16 @@ void StateScales::observe(const VectorXd& y) {
   }
   for (size_t i = 0; i < equations_.scene().wheels.size(); ++i)
     raise(equations_.wheel(i), 1, std::abs(y[equations_.wheel(i)]));
-  for (const int energy : {equations_.work(), equations_.dissipated()}) raise(energy, 1, std::abs(y[energy]));
+  for (int k = 0; k < equations_.energies(); ++k) raise(equations_.motion() + k, 1, std::abs(y[equations_.work() + k]));
 }
 
 void StateScales::weights(double* w) const {
-  Eigen::Map<VectorXd>(w, scale_.size()) = (tolerance_ * scale_).cwiseMax(least_).cwiseInverse();
+  constexpr double not_weighed = 1e-100;
+  const VectorXd all = (tolerance_ * scale_).cwiseMax(least_).cwiseInverse();
+  Eigen::Map<VectorXd> weights(w, equations_.size());
+  weights.setConstant(not_weighed / tolerance_);
+  weights.head(equations_.motion()) = all.head(equations_.motion());
+  weights.tail(equations_.energies()) = all.tail(equations_.energies());
 }
 
 }  // namespace flexboom::redundant

@@ -21,6 +21,7 @@ class StateScales {
               double duration);
 
   void observe(const Eigen::VectorXd& y);
+  /// Of the unknowns as they are numbered now.
   void weights(double* w) const;
 
  private:
@@ -28,8 +29,9 @@ class StateScales {
   void set_least();
 
   const Equations& equations_;
-  double tolerance_, length_ = 0;          // positions are known to round-off of this [m]
-  Eigen::VectorXd start_, scale_, least_;  // least: some round-off, or Newton can not converge
+  double tolerance_, length_ = 0;  // positions are known to round-off of this [m]
+  Eigen::VectorXd start_;
+  Eigen::VectorXd scale_, least_;  // of motion and energies; least: some round-off, or Newton can not converge
 };
 
 }  // namespace flexboom::redundant

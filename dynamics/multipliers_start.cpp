@@ -110,7 +110,8 @@ RankReport constraint_rank(Equations& e, double t, const double* y) {
   }
   report.margin = largest > 0 ? smallest / largest : 1;
   for (size_t i = 0; i < names.size(); ++i)
-    if (!report.kept[i]) report.left_out.push_back(names[i]);
+    if (const JointData& j = e.joints()[names[i].joint]; !report.kept[i] && j.is_there(j.rows[names[i].row]))
+      report.left_out.push_back(names[i]);
   return report;
 }
 
@@ -291,7 +292,7 @@ void Equations::make_consistent(double t, VectorXd& y, VectorXd& y_dot, const Jo
       if (r.kept) y[r.lambda] = x[row++];
   residual(t, y.data(), y_dot.data(), memory, F.data());  // what is left: rates of the wheels and of the energies
   for (size_t i = 0; i < scene_.wheels.size(); ++i) y_dot[wheel(i)] = -F[wheel(i)];
-  for (const int energy : {work_, dissipated_}) y_dot[energy] = -F[energy];
+  for (int energy = work_; energy < size_; ++energy) y_dot[energy] = -F[energy];
 }
 
 }  // namespace flexboom::redundant

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "dynamics/laws.hpp"
 #include "dynamics/system.hpp"
 #include "dynamics/tree.hpp"
 
@@ -28,9 +29,12 @@ class Ode {
   /// How far beyond its stop a hinge is, and the rate of that (of y) or its acceleration (of y_dot).
   virtual double gap(const double* y, int stop) const = 0;
   virtual double gap_rate(const double* y, int stop) const = 0;
+  /// Of the switches of laws, which are numbered behind the stops.
+  virtual Gap switch_gap(double /*t*/, const double* /*y*/, int /*number*/) { return {}; }
 };
 
 std::unique_ptr<Ode> ode_of(const System&);
-std::unique_ptr<Ode> ode_of(const Tree&);
+/// laws: as they are whenever the equations are asked.
+std::unique_ptr<Ode> ode_of(const Tree&, const Laws& laws);
 
 }  // namespace flexboom

@@ -63,9 +63,10 @@ class StepCrossings {
   void arm(std::span<const char> armed) { armed_.assign(armed.begin(), armed.end()); }
 
   /// The state at the start of a step.
-  void begin(const Problem& problem, const double* y) {
+  void begin(const Problem& problem, double t, const double* y) {
     from_.resize(armed_.size());
-    for (size_t i = 0; i < armed_.size(); ++i) from_[i] = clearance(problem, y, i, 0, 1);
+    for (size_t i = 0; i < armed_.size(); ++i)
+      if (armed_[i]) from_[i] = clearance(problem, t, y, i, 0, 1);
   }
 
   /// The fraction of the step from t that ends at the first crossing, or 1. y: at its end. state_at(c): the state at a
@@ -78,11 +79,11 @@ class StepCrossings {
     double end = 1;
     for (size_t i = 0; i < armed_.size(); ++i) {
       if (!armed_[i]) continue;
-      const auto at = [&](double c) { return clearance(problem, state_at(c), i, c, length); };
+      const auto at = [&](double c) { return clearance(problem, t + c * length, state_at(c), i, c, length); };
       Clearance from = from_[i];
       from.slope *= length;
       const double resolution = 4e-16 * std::max(1.0, std::abs(t) / length);
-      double root = crossing_between(at, from, clearance(problem, y, i, 1, length), resolution);
+      double root = crossing_between(at, from, clearance(problem, t + length, y, i, 1, length), resolution);
       if (root == crossed_from_the_start) root = 0;
       if (root > 1) continue;
       roots_.emplace_back(i, root);
@@ -97,9 +98,13 @@ class StepCrossings {
 
  private:
   /// Of the gap on the side of its flag.
-  static Clearance clearance(const Problem& problem, const double* y, size_t i, double c, double length) {
+  static Clearance clearance(const Problem& problem, double t, const double* y, size_t i, double c, double length) {
     const double side = problem.contacts()[i] ? 1 : -1;
     const int hinge = static_cast<int>(i);
+    if (hinge >= problem.ode().stops()) {
+      const Gap gap = problem.ode().switch_gap(t, y, hinge);
+      return {c, side * gap.value, side * length * gap.rate};
+    }
     return {c, side * problem.ode().gap(y, hinge), side * length * problem.ode().gap_rate(y, hinge)};
   }
 

@@ -68,7 +68,7 @@ std::string mass_fault(const Multibody& scene, const tree::Link& link, const tre
   const JointType& type = joint_type(link.kind);
   const std::string& joint = scene.joints[static_cast<size_t>(link.joint)].name;
   const std::string& body = scene.bodies[static_cast<size_t>(link.index)].name;
-  for (int k = 0; k < type.freedoms && link.kind != JointKind::free && !link.prescribed; ++k) {
+  for (int k = 0; k < type.freedoms && link.kind != JointKind::free && !link.prescribed && !s.held_joint; ++k) {
     if (moves_inertia(link, s, k)) continue;
     const bool slides = type.freedom[static_cast<size_t>(k)] < Freedom::turn_x;
     return fmt::format(
@@ -112,7 +112,7 @@ void check_mass(const tree::Model& model, double t, const double* y, int size, c
     const tree::Link& link = model.links[i];
     const tree::LinkScratch<double>& s = scratch.links[i];
     bool sound = has_modal_mass(link, s);
-    if (link.kind != JointKind::free && !link.prescribed)
+    if (link.kind != JointKind::free && !link.prescribed && !s.held_joint)
       for (int k = 0; k < joint_type(link.kind).freedoms; ++k) sound = sound && moves_inertia(link, s, k);
     if (sound || !Eigen::Map<const VectorXd>(y, size).allFinite()) continue;
     throw NumericalError(fmt::format("t = {:.9g} s: {}", t, mass_fault(*model.scene, link, s)));
@@ -216,10 +216,19 @@ void Tree::impose(double t, Eigen::Ref<VectorXd> y) const {
 }
 
 FLEXBOOM_INNER_LOOP
-void Tree::derivative(double t, const double* y, std::span<const char> contact, TreeWorkspace& w, double* y_dot) const {
+void Tree::derivative(double t, const double* y, std::span<const char> contact, TreeWorkspace& w, double* y_dot,
+                      std::span<const LawBranch> laws) const {
   tree::set_instant(impl_->model, t, w.instant);
+  w.instant.laws = laws;
   tree::derivative(impl_->model, y, w.instant, contact, w.scratch, y_dot);
   check_mass(impl_->model, t, y, impl_->layout.size, w.scratch);
+}
+
+double Tree::hold_load(int joint, const double* y, const TreeWorkspace& w) const {
+  const auto& links = impl_->model.links;
+  const auto link = std::ranges::find(links, joint, &tree::Link::joint);
+  const auto i = static_cast<size_t>(link - links.begin());
+  return tree::drive_load(*link, 0, y, w.instant.drives[i], w.instant.law(*link), false, w.scratch.links[i]);
 }
 
 }  // namespace flexboom

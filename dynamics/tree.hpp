@@ -1,5 +1,6 @@
 #pragma once
 
+#include "dynamics/energy_ledger.hpp"
 #include "dynamics/joint.hpp"
 #include "dynamics/multibody.hpp"
 
@@ -36,6 +37,7 @@ struct TreeState {
 struct TreeLayout {
   struct Joint {  // -1: it has none
     int scalar = -1, omega = -1, position = -1, attitude = -1, velocity = -1, dissipated = -1;
+    int losses = -1;  // of a law, in the order of law_losses [J]
   };
   std::vector<Joint> joints;  // as Multibody::joints; `scalar` is a place in p, the others in y
   std::vector<int> q;         // per body, place in p
@@ -63,6 +65,7 @@ struct TreeBalance {
   /// What is kept.
   double energy() const { return kinetic + elastic + potential + dissipated - work; }
   std::vector<double> dissipated_by_joint;
+  EnergyLedger ledger;  // of elastic and dissipated
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();
   double momentum_scale = 0, angular_momentum_scale = 0;  // sums over the bodies of the norms
@@ -116,10 +119,16 @@ class Tree {
 
   /// y_dot = f(t, y) with the stops of joints with contact[joint] closed. Allocates nothing.
   /// @throws NumericalError naming the body where the mass matrix at y is singular to round-off.
-  void derivative(double t, const double* y, std::span<const char> contact, TreeWorkspace&, double* y_dot) const;
+  /// laws: a branch per joint, or empty: laws do nothing.
+  void derivative(double t, const double* y, std::span<const char> contact, TreeWorkspace&, double* y_dot,
+                  std::span<const LawBranch> laws = {}) const;
+
+  /// What holds a joint that its law holds pushes b with, at what the workspace was used for last.
+  double hold_load(int joint, const double* y, const TreeWorkspace&) const;
 
   /// df/dy, exact by forward differentiation.
-  void jacobian(double t, const double* y, std::span<const char> contact, TreeWorkspace&, Eigen::MatrixXd& J) const;
+  void jacobian(double t, const double* y, std::span<const char> contact, TreeWorkspace&, Eigen::MatrixXd& J,
+                std::span<const LawBranch> laws = {}) const;
 
   /// Joints with a stop, and where they are: coordinate less threshold, its rate.
   const std::vector<int>& stops() const;
@@ -133,11 +142,12 @@ class Tree {
   TreeBalance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y) const;
   PlaceMotionInSpace motion(double t, const Eigen::Ref<const Eigen::VectorXd>& y, const Place&) const;
   std::vector<JointLoad> joint_loads(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
-                                     std::span<const char> contact) const;
+                                     std::span<const char> contact, std::span<const LawBranch> laws = {}) const;
 
   /// Of each body.
   std::vector<StiffeningEffect> stiffening_effect(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
-                                                  std::span<const char> contact) const;
+                                                  std::span<const char> contact,
+                                                  std::span<const LawBranch> laws = {}) const;
 
   struct Impl;
   const Impl& impl() const { return *impl_; }

@@ -21,22 +21,28 @@ namespace {
 
 /// Everything at (t, y), poses included.
 TreeWorkspaceHandle evaluated(const Tree& system, const tree::Model& model, double t,
-                              const Eigen::Ref<const VectorXd>& y, std::span<const char> contact) {
+                              const Eigen::Ref<const VectorXd>& y, std::span<const char> contact,
+                              std::span<const LawBranch> laws = {}) {
   require(y.size() == system.layout().size, "the state has the wrong size");
   TreeWorkspaceHandle work = system.workspace();
   VectorXd y_dot(y.size());
   const VectorXd state = y;
-  system.derivative(t, state.data(), contact, *work, y_dot.data());
+  system.derivative(t, state.data(), contact, *work, y_dot.data(), laws);
   tree::move_links(model, state.data(), work->instant, true, work->scratch);
   return work;
 }
 
-double elastic_energy(const tree::Link& link, const Joint& joint, const ReducedBody& body,
-                      const Eigen::Ref<const VectorXd>& y) {
-  const bool has_mechanism = link.kind == JointKind::hinge || link.kind == JointKind::slider;
-  const double in_joint = has_mechanism ? energy(joint.mechanism, y[link.scalar]) : 0;
+void add_elastic_energy(const tree::Link& link, const Joint& joint, const ReducedBody& body,
+                        const Eigen::Ref<const VectorXd>& y, EnergyLedger& to) {
+  if (link.law) {
+    const LawModel law(joint);
+    to.springs += law.spring_energy(y[link.scalar]), to.stops += law.stop_energy(y[link.scalar]);
+  } else if (link.kind == JointKind::hinge || link.kind == JointKind::slider) {
+    const double in_stop = energy({.stop_stiffness = joint.mechanism.stop_stiffness}, y[link.scalar]);
+    to.springs += energy(joint.mechanism, y[link.scalar]) - in_stop, to.stops += in_stop;
+  }
   const auto q = y.segment(link.q, link.body.n);
-  return link.body.n ? in_joint + 0.5 * q.dot(body.Ke * q) : in_joint;
+  if (link.body.n) to.structures += 0.5 * q.dot(body.Ke * q);
 }
 
 /// Sums over the bodies, about the inertial origin.
@@ -81,8 +87,8 @@ TreeBalance Tree::balance(double t, const Eigen::Ref<const VectorXd>& y, TreeWor
     const tree::Link& link = model.links[i];
     tree::add_body(link, y.data(), scratch.links[i]);
     totals.add(link, scratch.links[i], y);
-    b.elastic += elastic_energy(link, impl_->scene.joints[static_cast<size_t>(link.joint)],
-                                impl_->scene.bodies[static_cast<size_t>(link.index)], y);
+    add_elastic_energy(link, impl_->scene.joints[static_cast<size_t>(link.joint)],
+                       impl_->scene.bodies[static_cast<size_t>(link.index)], y, b.ledger);
   }
   for (size_t i = 0; i < model.wheels.size(); ++i) {
     const tree::LinkScratch<double>& s = scratch.links[static_cast<size_t>(model.wheels[i].link)];
@@ -96,13 +102,23 @@ TreeBalance Tree::balance(double t, const Eigen::Ref<const VectorXd>& y, TreeWor
     const auto from = tree::find_place(model, spring.a, y.data(), scratch, scratch.U);
     const auto to = tree::find_place(model, spring.b, y.data(), scratch, scratch.U);
     const double stretch = eigen(to.position - from.position).norm() - spring.free_length;
-    b.elastic += 0.5 * spring.stiffness * stretch * stretch;
+    b.ledger.springs += 0.5 * spring.stiffness * stretch * stretch;
   }
+  b.elastic = b.ledger.stored();
   b.potential = -impl_->scene.gravity.dot(totals.first_moment);
   b.angular_momentum -= (totals.first_moment / totals.m).cross(b.momentum);
-  for (const TreeLayout::Joint& joint : impl_->layout.joints) b.dissipated_by_joint.push_back(y[joint.dissipated]);
+  b.ledger.elsewhere = y[impl_->layout.dissipated_elsewhere];
+  for (const TreeLayout::Joint& joint : impl_->layout.joints) {
+    b.dissipated_by_joint.push_back(y[joint.dissipated]);
+    b.ledger.dampers += y[joint.dissipated];
+    if (joint.losses < 0) continue;
+    for (int k = 0; k < static_cast<int>(law_losses.size()); ++k) {
+      b.dissipated_by_joint.back() += y[joint.losses + k];
+      b.ledger.laws[static_cast<size_t>(k)] += y[joint.losses + k];
+    }
+  }
   for (const double d : b.dissipated_by_joint) b.dissipated += d;
-  b.dissipated += y[impl_->layout.dissipated_elsewhere];
+  b.dissipated += b.ledger.elsewhere;
   b.work = y[impl_->layout.work];
   return b;
 }
@@ -121,10 +137,10 @@ PlaceMotionInSpace Tree::motion(double t, const Eigen::Ref<const VectorXd>& stat
   return m;
 }
 
-std::vector<JointLoad> Tree::joint_loads(double t, const Eigen::Ref<const VectorXd>& y,
-                                         std::span<const char> contact) const {
+std::vector<JointLoad> Tree::joint_loads(double t, const Eigen::Ref<const VectorXd>& y, std::span<const char> contact,
+                                         std::span<const LawBranch> laws) const {
   const tree::Model& model = impl_->model;
-  const TreeWorkspaceHandle work = evaluated(*this, model, t, y, contact);
+  const TreeWorkspaceHandle work = evaluated(*this, model, t, y, contact, laws);
   std::vector<JointLoad> loads(impl_->scene.joints.size());
   const VectorXd state = y;
   for (size_t i = 0; i < model.links.size(); ++i) {
@@ -135,7 +151,7 @@ std::vector<JointLoad> Tree::joint_loads(double t, const Eigen::Ref<const Vector
     JointLoad& out = loads[static_cast<size_t>(link.joint)];
     out.force = eigen(load.t), out.torque = eigen(load.w);
     for (int k = 0; link.prescribed && k < joint_type(link.kind).scalars; ++k)
-      out.drive.push_back(tree::drive_load(link, k, state.data(), work->instant.drives[i],
+      out.drive.push_back(tree::drive_load(link, k, state.data(), work->instant.drives[i], {},
                                            contact[static_cast<size_t>(link.joint)] != 0, s));
   }
   return loads;
@@ -160,9 +176,10 @@ StiffeningEffect stiffening_effect(const ReducedBody& body, const MatrixXd& Kg) 
 }
 
 std::vector<StiffeningEffect> Tree::stiffening_effect(double t, const Eigen::Ref<const VectorXd>& y,
-                                                      std::span<const char> contact) const {
+                                                      std::span<const char> contact,
+                                                      std::span<const LawBranch> laws) const {
   const tree::Model& model = impl_->model;
-  const TreeWorkspaceHandle work = evaluated(*this, model, t, y, contact);
+  const TreeWorkspaceHandle work = evaluated(*this, model, t, y, contact, laws);
   std::vector<MatrixXd> K(impl_->scene.bodies.size());
   for (size_t i = 0; i < model.links.size(); ++i) {
     const tree::Link& link = model.links[i];

@@ -174,11 +174,12 @@ void add_motion(Freedom freedom, const Vec3<T>& turn_z_of_a, const T& s, Twist<T
   }
 }
 
-/// Torque or force of the mechanism along the joint's first coordinate.
+/// Torque or force of the mechanism, or of the law that holds it, along the joint's first coordinate.
 template <class T>
-T mechanism_load(const Link& link, const T* y, const Instant::Drive& drive, bool contact) {
+T mechanism_load(const Link& link, const T* y, const Instant::Drive& drive, const LawBranch& law, bool contact) {
   if (link.kind != JointKind::hinge && link.kind != JointKind::slider) return T(0.0);
   const JointCoordinates<T> j(link, y, drive);
+  if (link.law) return law.load(j.x[0], j.rate[0]);
   return equations::hinge_torque(link.body, j.x[0], j.rate[0], contact ? 1.0 : 0.0);
 }
 
@@ -201,7 +202,7 @@ void eliminate_freedom(Freedom freedom, int i, const T& load, LinkScratch<T>& s)
 /// Eliminates the freedoms of the joint one after the other.
 template <class T>
 void eliminate_freedoms(const Link& link, const T& load, LinkScratch<T>& s) {
-  if (link.prescribed) return;
+  if (link.prescribed || s.held_joint) return;
   if (link.kind == JointKind::hinge) return eliminate_freedom(Freedom::turn_z, 0, load, s);  // nearly all joints are
   const JointType& type = joint_type(link.kind);
   for (int i = 0; i < type.freedoms; ++i)
@@ -307,7 +308,9 @@ void release_link(const Model& model, const Link& link, const LinkScratch<T>* pa
     y_dot[link.velocity] = a.x, y_dot[link.velocity + 1] = a.y, y_dot[link.velocity + 2] = a.z;
   } else {
     s.handle = s.base;
-    if (link.kind == JointKind::hinge && !link.prescribed)
+    if (s.held_joint)
+      y_dot[link.rate] = T(0.0);
+    else if (link.kind == JointKind::hinge && !link.prescribed)
       y_dot[link.rate] = release_freedom(Freedom::turn_z, 0, s);
     else if (!link.prescribed)
       for (int i = type.freedoms - 1; i >= 0; --i)
@@ -329,7 +332,9 @@ void accelerate(const Model& model, const T* y, const Instant& instant, std::spa
     condense_link(link, y, s, model.forces);
     if (link.kind == JointKind::free) continue;
     const bool closed = contact[static_cast<size_t>(link.joint)] != 0;
-    eliminate_freedoms(link, mechanism_load(link, y, instant.drives[i], closed), s);
+    const LawBranch& law = instant.law(link);
+    s.held_joint = law.held;
+    eliminate_freedoms(link, mechanism_load(link, y, instant.drives[i], law, closed), s);
     if (link.parent >= 0) hand_to_parent(link, s, scratch.links[static_cast<size_t>(link.parent)]);
   }
   for (size_t i = 0; i < count; ++i) {

@@ -136,11 +136,12 @@ void quaternion_rate(const T* q, const T* w, T* q_dot) {
   q_dot[3] = 0.5 * (q[0] * w[2] + q[1] * w[1] - q[2] * w[0]);
 }
 
-/// Power that the drive of a prescribed joint gives: its load less the mechanism's.
+/// What drives a prescribed joint or holds one that its law holds: the joint's load less the mechanism's.
 template <class T>
-T drive_load(const Link& link, int i, const T* y, const Instant::Drive& drive, bool contact, const LinkScratch<T>& s) {
+T drive_load(const Link& link, int i, const T* y, const Instant::Drive& drive, const LawBranch& law, bool contact,
+             const LinkScratch<T>& s) {
   const T load = along(joint_type(link.kind).freedom[static_cast<size_t>(i)], s.turn_z_of_a, joint_load(s));
-  return i == 0 ? load - mechanism_load(link, y, drive, contact) : load;
+  return i == 0 ? load - mechanism_load(link, y, drive, law, contact) : load;
 }
 
 /// The rates of everything that is no acceleration.
@@ -158,13 +159,19 @@ void follow(const Model& model, const T* y, const Instant& instant, std::span<co
       if (!link.prescribed) continue;
       y_dot[link.rate + k] = T(instant.drives[i].acceleration[static_cast<size_t>(k)]);
       const bool closed = contact[static_cast<size_t>(link.joint)] != 0;
-      scratch.power += joint.rate[static_cast<size_t>(k)] * drive_load(link, k, y, instant.drives[i], closed, s);
+      scratch.power += joint.rate[static_cast<size_t>(k)] * drive_load(link, k, y, instant.drives[i], {}, closed, s);
     }
     if (type.turns) quaternion_rate(y + link.attitude, y + link.omega, y_dot + link.attitude);
     if (type.floats)
       for (int k = 0; k < 3; ++k) y_dot[link.position + k] = y[link.velocity + k];
     const bool damped = link.kind == JointKind::hinge || link.kind == JointKind::slider;
     y_dot[link.dissipated] = damped ? b.damping * (joint.rate[0] * joint.rate[0]) : T(0.0);
+    if (link.law) {
+      const LawBranch& law = instant.law(link);
+      y_dot[link.dissipated] = law.damper_power(joint.rate[0]);
+      for (int k = 0; k < static_cast<int>(law_losses.size()); ++k)
+        y_dot[link.losses + k] = law.power(static_cast<LawLoss>(k), joint.x[0], joint.rate[0]);
+    }
     const T* v = y + link.q_dot;
     const auto n = static_cast<size_t>(b.n);
     T loss = T(0.0);

@@ -30,10 +30,9 @@ class TreeScales {
     for (const ReducedBody& b : tree.scene().bodies) length = std::max(length, std::sqrt(b.J0.trace() / b.m));
     error_.scale = VectorXd::Constant(l.size, part * std::max(length, 1.0));
     const double energy = std::abs(tree.balance(0, y0).kinetic) + std::abs(tree.balance(0, y0).elastic);
-    for (const int i : {l.dissipated_elsewhere, l.work}) error_.scale[i] = std::max(energy, part);
+    for (int i = l.dissipated; i < l.size; ++i) error_.scale[i] = std::max(energy, part);
     for (size_t i = 0; i < l.joints.size(); ++i) {
       const TreeLayout::Joint& j = l.joints[i];
-      error_.scale[j.dissipated] = std::max(energy, part);
       const int scalars = joint_type(tree.scene().joints[i].kind).scalars;
       for (int k = 0; k < scalars; ++k)
         groups_.push_back({j.scalar + k, 1}), groups_.push_back({l.rate(j.scalar + k), 1});
@@ -93,19 +92,24 @@ class TreeFlight final : public Flight<TreeTrajectory> {
  public:
   TreeFlight(const Tree& tree, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method,
              const Checkpoint<TreeTrajectory>& so_far)
-      : Flight(options, so_far, stops_of(tree), tree.scene().joints.size()),
+      : Flight(options, so_far, stops_of(tree), tree.scene().joints.size(), Laws(tree.scene().joints, options)),
         tree_(tree),
         scales_(tree, y0, method.local_share * options.tolerance),
-        ode_(ode_of(tree)),
-        stepper_(make_stepper(method, tree, scales_.error())),
+        ode_(ode_of(tree, laws_)),
+        stepper_(method.make != nullptr ? method.make(ode_of(tree, laws_), scales_.error())
+                                        : method.make_split(split(tree), scales_.error())),
         exact_in_linear_part_(method.make_split != nullptr),
         work_(tree.workspace()),
         effect_(tree.scene().bodies.size()),
-        y_dot_(y0.size()) {
+        y_dot_(y0.size()),
+        flags_(contacts_.closed()),
+        armed_(contacts_.armed()),
+        crossed_(contacts_.size() + laws_.switches().size(), 0) {
     y_ = y0;
     result_.summary.method = method.name;
     for (size_t i = 0; i < contacts_.size(); ++i) scales_.raise(scalar(i), contacts_.largest_gap(i));
     contacts_.begin(*this);
+    laws_.begin(*this, t_, result_.events);
   }
 
  private:
@@ -136,11 +140,77 @@ class TreeFlight final : public Flight<TreeTrajectory> {
 
   int scalar(size_t stop) const { return tree_.layout().joints[static_cast<size_t>(tree_.stops()[stop])].scalar; }
 
-  void restart() override { stepper_->restart(t_, y_, contacts_.closed(), contacts_.armed()); }
-  void step(double limit, double& t, VectorXd& y) override { stepper_->step(limit, t, y, contacts_.crossed()); }
+  Gap joint_way(size_t joint) override {
+    const int i = static_cast<int>(joint);
+    return {tree_.gap(y_.data(), i), tree_.gap_rate(y_.data(), i)};
+  }
+  double joint_acceleration(size_t joint) override {
+    evaluate(laws_.branches());
+    return tree_.gap_rate(y_dot_.data(), static_cast<int>(joint));
+  }
+  double hold_load(size_t joint) override {
+    evaluate(laws_.branches());
+    return tree_.hold_load(static_cast<int>(joint), y_.data(), *work_);
+  }
+  void put(size_t joint, double x) override { y_[tree_.layout().joints[joint].scalar] = x; }
+  void put_to_rest(size_t joint) override { y_[tree_.layout().rate(tree_.layout().joints[joint].scalar)] = 0; }
+  void lose(size_t joint, LawLoss loss, double energy) override {
+    y_[tree_.layout().joints[joint].losses + static_cast<int>(loss)] += energy;
+  }
+
+  /// Everything is affine in a load: what a load makes of accelerations, an impulse makes of rates. The load is as
+  /// large as the others, else its part were round-off.
+  void prepare_blow(size_t joint) override {
+    std::vector<LawBranch> loaded(laws_.branches().begin(), laws_.branches().end());
+    std::vector<double> hold(loaded.size(), 0.0);
+    evaluate(laws_.branches());
+    const VectorXd before = y_dot_;
+    for (size_t i = 0; i < hold.size(); ++i)
+      if (loaded[i].held) hold[i] = tree_.hold_load(static_cast<int>(i), y_.data(), *work_);
+    double load = 1;
+    for (int round = 0; round < 2; ++round) {
+      loaded[joint].spring = laws_.branches()[joint].spring + load;
+      evaluate(loaded);
+      blow_ = (y_dot_ - before) / load;
+      hold_of_blow_.assign(hold.size(), 0.0);
+      for (size_t i = 0; i < hold.size(); ++i)
+        if (loaded[i].held)
+          hold_of_blow_[i] = (tree_.hold_load(static_cast<int>(i), y_.data(), *work_) - hold[i]) / load;
+      load = 1e3 * (1 + before.cwiseAbs().maxCoeff()) / std::abs(rate_of_blow(joint));
+    }
+  }
+  double rate_of_blow(size_t joint) override { return tree_.gap_rate(blow_.data(), static_cast<int>(joint)); }
+  double hold_of_blow(size_t joint) override { return hold_of_blow_[joint]; }
+  void strike(double impulse) override { y_ += impulse * blow_; }
+
+  void evaluate(std::span<const LawBranch> laws) {
+    const TreeLayout& l = tree_.layout();
+    std::vector<char> contact(l.joints.size(), 0);
+    for (size_t i = 0; i < contacts_.size(); ++i) contact[contacts_.stop(i).joint] = contacts_.closed()[i];
+    tree_.derivative(t_, y_.data(), contact, *work_, y_dot_.data(), laws);
+  }
+
+  /// Stops come before the switches of laws.
+  void restart() override {
+    const auto both = [](const std::vector<char>& stops, const std::vector<char>& laws, std::vector<char>& all) {
+      all = stops;
+      all.insert(all.end(), laws.begin(), laws.end());
+    };
+    both(contacts_.closed(), laws_.sides(), flags_), both(contacts_.armed(), laws_.armed(), armed_);
+    stepper_->restart(t_, y_, flags_, armed_);
+  }
+  void step(double limit, double& t, VectorXd& y) override {
+    stepper_->step(limit, t, y, crossed_);
+    const auto stops = static_cast<std::ptrdiff_t>(contacts_.size());
+    std::copy(crossed_.begin(), crossed_.begin() + stops, contacts_.crossed().begin());
+    std::copy(crossed_.begin() + stops, crossed_.end(), laws_.crossed().begin());
+  }
   void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override { stepper_->interpolate_all(times, Y); }
   void observe(const VectorXd& y) override { scales_.observe(y); }
-  void keep_rows(size_t rows) override { result_.y.resize(rows), result_.balance.resize(rows); }
+  void keep_rows(size_t rows) override {
+    result_.y.resize(rows), result_.balance.resize(rows);
+    if (!laws_.empty()) result_.laws.resize(rows);
+  }
 
   void record(double t, VectorXd y) override {
     for (const TreeLayout::Joint& j : tree_.layout().joints) {
@@ -154,6 +224,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     if (t == output_time()) look_at_stiffening(t, y);
     result_.time.push_back(t);
     result_.y.push_back(std::move(y));
+    if (!laws_.empty()) result_.laws.emplace_back(laws_.branches().begin(), laws_.branches().end());
   }
 
   /// At every output of a short list, at some of a long one: an eigenvalue problem for each body.
@@ -163,7 +234,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     if (result_.time.size() % stride != 0) return;
     std::vector<char> contact(tree_.scene().joints.size(), 0);
     for (size_t i = 0; i < contacts_.size(); ++i) contact[contacts_.stop(i).joint] = contacts_.closed()[i];
-    flexboom::observe(tree_.stiffening_effect(t, y, contact), t, effect_);
+    flexboom::observe(tree_.stiffening_effect(t, y, contact, laws_.branches()), t, effect_);
   }
 
   void finish() override {
@@ -172,8 +243,10 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     add_counts(stepper_->counts(), s);
     Conservation kept(tree_.scene().bodies, options_.largest);
     for (const TreeBalance& b : result_.balance)
-      kept.add(b.energy(),
-               std::max({b.kinetic + b.elastic, std::abs(b.work), b.dissipated, digits * std::abs(b.potential)}), b);
+      kept.add(
+          b.energy(),
+          std::max({b.kinetic + std::abs(b.elastic), std::abs(b.work), b.dissipated, digits * std::abs(b.potential)}),
+          b);
     s.largest = kept.largest();
     s.energy_balance = kept.energy_balance();
     if (is_isolated(tree_.scene())) s.momentum_drift = kept.momentum_drift();
@@ -189,7 +262,10 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   bool exact_in_linear_part_;
   TreeWorkspaceHandle work_;
   std::vector<LargestStiffening> effect_;  // per body
-  VectorXd y_dot_;
+  VectorXd y_dot_, blow_;                  // blow: change of the state per impulse
+  std::vector<double> hold_of_blow_;       // per joint
+  std::vector<char> flags_, armed_;        // of stops and switches
+  std::vector<int> crossed_;
 };
 
 }  // namespace
@@ -276,6 +352,9 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   check_options(o, tree.scene().joints.size());
   require(y0.size() == tree.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   if (tree.scene().field) tree.scene().field->orbit.at(o.duration);  // does it last so long?
+  const bool has_laws = std::ranges::any_of(tree.scene().joints, [](const Joint& j) { return j.law.given(); });
+  require(!has_laws || integrator_method(o.method).make != nullptr,
+          fmt::format("method '{}' simulates no laws of joints; 'adams', 'bdf', 'dirk' and 'erk' do", o.method));
   VectorXd start = y0;
   tree.impose(o.start, start);
   if (o.method != "auto") return TreeFlight(tree, start, o, integrator_method(o.method), so_far).fly();

@@ -25,6 +25,7 @@ struct TreeTrajectory {
   std::vector<double> time;
   std::vector<Eigen::VectorXd> y;  // Tree::layout(), prescribed coordinates as prescribed
   std::vector<TreeBalance> balance;
+  std::vector<std::vector<LawBranch>> laws;  // per joint; empty where no joint has a law
   std::vector<StopEvent> events;
   IntegrationSummary summary;                        // momentum_drift: unknown where something holds or pushes
   std::vector<LargestStiffening> stiffening_effect;  // per body, at the outputs

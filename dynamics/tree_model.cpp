@@ -127,6 +127,8 @@ void set_mechanism(const Joint& joint, Link& link) {
   link.body.damping = m.damping;
   link.body.stop_stiffness = m.stop_stiffness;
   link.prescribed = !joint.prescribed.empty();
+  link.law = joint.law.given();
+  if (link.law) link.body.stiffness = link.body.preload = link.body.damping = link.body.stop_stiffness = 0;
 }
 
 void set_second_order(const SecondOrderShapes& body, const Vector3d& origin, const Matrix3d& axes, Link& link) {
@@ -187,6 +189,8 @@ void lay_out(const Multibody& scene, Model& model, TreeLayout& l) {
   for (TreeLayout::Joint& joint : l.joints) joint.dissipated = next++;
   l.dissipated_elsewhere = next++;
   l.work = next++;
+  for (size_t i = 0; i < scene.joints.size(); ++i)
+    if (scene.joints[i].law.given()) l.joints[i].losses = next, next += static_cast<int>(law_losses.size());
   l.size = next;
   for (Link& link : model.links) {
     const TreeLayout::Joint& joint = l.joints[static_cast<size_t>(link.joint)];
@@ -196,6 +200,7 @@ void lay_out(const Multibody& scene, Model& model, TreeLayout& l) {
     link.q_dot = l.rate(link.q);
     link.omega = joint.omega, link.position = joint.position, link.attitude = joint.attitude;
     link.velocity = joint.velocity, link.dissipated = joint.dissipated;
+    link.losses = joint.losses;
   }
   model.spin = l.spin, model.losses = l.dissipated_elsewhere, model.work = l.work;
 }

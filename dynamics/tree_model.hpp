@@ -46,10 +46,11 @@ struct Link {
   int slots = 0;  // own children there
   double threshold = 0;
   bool prescribed = false;
+  bool law = false;  // beside the mechanism, which is then part of it
 
   // Places in y, -1: none.
   int scalar = -1, rate = -1, q = 0, q_dot = 0, omega = -1, position = -1, attitude = -1, velocity = -1,
-      dissipated = -1;
+      dissipated = -1, losses = -1;
   Vec3<double> brf_origin;  // of the body's BRF in its frame, and the axes of the BRF there
   Mat3<double> brf_axes;
 };

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <vector>
 
 namespace flexboom::tree {
@@ -51,6 +52,8 @@ struct LinkScratch {
   Twist<T> external;  // forces on the body about its origin
   std::vector<T> external_modal;
 
+  bool held_joint = false;  // by its law
+
   HubSystem<T> I;  // of the body and all that hangs on it; in the end at place b, freedoms eliminated
   std::array<Eliminated<T>, 3> freedom;
   Twist<T> base, handle, acceleration;  // of place b without the joint's freedoms; of place b; of the body's origin
@@ -77,6 +80,12 @@ struct Instant {
   std::vector<Drive> drives;         // per link
   std::vector<Twist<double>> loads;  // in their own axes
   std::vector<double> wheels;        // torques
+  std::span<const LawBranch> laws;   // per joint; empty: none does anything
+
+  const LawBranch& law(const Link& link) const {
+    static constexpr LawBranch nothing;
+    return !link.law || laws.empty() ? nothing : laws[static_cast<size_t>(link.joint)];
+  }
 };
 
 template <class T>
