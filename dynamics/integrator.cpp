@@ -7,6 +7,7 @@
 #include "dynamics/exponential.hpp"
 #include "dynamics/ode.hpp"
 #include "dynamics/rotation.hpp"
+#include "dynamics/split.hpp"
 #include "fem/check.hpp"
 
 #include <fmt/format.h>
@@ -186,7 +187,8 @@ class SystemFlight final : public Flight<Trajectory> {
         system_(system),
         method_(method),
         scales_(system, y0, method.local_share * options.tolerance, options.rescale_at_events),
-        stepper_(make_stepper(method, system, scales_.error())),
+        stepper_(method.make != nullptr ? method.make(ode_of(system), scales_.error())
+                                        : method.make_split(split(system), scales_.error())),
         y_dot_(y0.size()),
         work_(system.workspace()) {
     y_ = y0;

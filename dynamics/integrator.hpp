@@ -118,11 +118,4 @@ std::span<const IntegratorMethod> integrator_methods();
 /// @throws InputError for a name that is not in the table, listing those that are.
 const IntegratorMethod& integrator_method(const std::string& name);
 
-/// The method on a System or a Tree; `ode.hpp` and `split.hpp` tell it how.
-template <class Equations>
-std::unique_ptr<Stepper> make_stepper(const IntegratorMethod& method, const Equations& equations,
-                                      const ErrorScale& scale) {
-  return method.make != nullptr ? method.make(ode_of(equations), scale) : method.make_split(split(equations), scale);
-}
-
 }  // namespace flexboom

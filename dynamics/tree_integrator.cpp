@@ -323,7 +323,7 @@ MethodChoice choose_method(const Tree& tree, const VectorXd& y0, const Integrato
     for (const SplitLayout::Turn& turn : layout.turns) at_rest.segment<3>(turn.omega).setZero();
     const RealEigenvectors eigen = eigenvectors(problem->linear(o.start, at_rest.data(), closed));
     const double fastest = std::sqrt((eigen.real.cwiseAbs2() + eigen.imaginary.cwiseAbs2()).maxCoeff());
-    const std::unique_ptr<Stepper> stepper = make_stepper(exponential, tree, scales.error());
+    const std::unique_ptr<Stepper> stepper = exponential.make_split(split(tree), scales.error());
     stepper->restart(o.start, y0, closed, armed);
     double t = o.start, turned = 0;
     VectorXd y = y0;
@@ -353,12 +353,12 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   require(y0.size() == tree.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   if (tree.scene().field) tree.scene().field->orbit.at(o.duration);  // does it last so long?
   const bool has_laws = std::ranges::any_of(tree.scene().joints, [](const Joint& j) { return j.law.given(); });
-  require(!has_laws || integrator_method(o.method).make != nullptr,
+  require(!has_laws || o.method == "auto" || integrator_method(o.method).make != nullptr,
           fmt::format("method '{}' simulates no laws of joints; 'adams', 'bdf', 'dirk' and 'erk' do", o.method));
   VectorXd start = y0;
   tree.impose(o.start, start);
   if (o.method != "auto") return TreeFlight(tree, start, o, integrator_method(o.method), so_far).fly();
-  MethodChoice choice = choose_method(tree, start, o);
+  MethodChoice choice = has_laws ? MethodChoice{"bdf", "joints have laws"} : choose_method(tree, start, o);
   TreeTrajectory result;
   try {
     result = TreeFlight(tree, start, o, integrator_method(choice.name), so_far).fly();

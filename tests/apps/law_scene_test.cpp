@@ -162,7 +162,7 @@ TEST(LawScene, HingesOfAHubHaveThemToo) {
   EXPECT_FALSE(load_scene("sport").is_tree);
 }
 
-std::string fault_of(const std::string& law, const std::string& kind = "hinge") {
+std::string law_fault(const std::string& law, const std::string& kind = "hinge") {
   std::string text = scene_text(law);
   if (kind != "hinge") {
     text.replace(text.find("kind = \"hinge\""), 14, "kind = \"" + kind + "\"");
@@ -202,7 +202,7 @@ TEST(LawScene, BadCombinationsAreErrors) {
       {"friction = { coulomb = 0.2 }\nmotion = \"t\"", "friction", "beside motion"},
   };
   for (const auto& row : table) {
-    const std::string fault = fault_of(row[0]);
+    const std::string fault = law_fault(row[0]);
     EXPECT_NE(fault.find("joints[1]." + row[1]), std::string::npos) << row[0] << "\n" << fault;
     EXPECT_NE(fault.find(row[2]), std::string::npos) << row[0] << "\n" << fault;
     EXPECT_NE(fault.find("law.toml:"), std::string::npos) << fault;
@@ -213,8 +213,8 @@ TEST(LawScene, BadCombinationsAreErrors) {
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("simulates no laws"), std::string::npos) << error.what();
   }
-  EXPECT_NE(fault_of("preload = 1.0", "spherical").find("hinges and sliders have"), std::string::npos);
-  EXPECT_NE(fault_of("backlash = 0.1", "slider").find("needs a stiffness"), std::string::npos);
+  EXPECT_NE(law_fault("preload = 1.0", "spherical").find("hinges and sliders have"), std::string::npos);
+  EXPECT_NE(law_fault("backlash = 0.1", "slider").find("needs a stiffness"), std::string::npos);
 }
 
 TEST(LawScene, StateTextReadsBack) {
