@@ -219,6 +219,22 @@ std::vector<std::string> stiffening_warnings(const Multibody& scene, const std::
   return warnings;
 }
 
+std::vector<LargestStiffening> largest_stiffening(const Tree& tree, const TreeTrajectory& flight) {
+  std::vector<LargestStiffening> largest(tree.scene().bodies.size());
+  const size_t stride = flight.y.size() / 500 + 1;
+  for (size_t row = 0; row < flight.y.size(); row += stride) {
+    const VectorXd& y = flight.y[row];
+    observe(tree.stiffening_effect(flight.time[row], y, closed_stops(tree, y)), flight.time[row], largest);
+  }
+  return largest;
+}
+
+std::vector<char> closed_stops(const Tree& tree, const Eigen::Ref<const VectorXd>& y) {
+  std::vector<char> closed(tree.scene().joints.size(), 0);
+  for (const int joint : tree.stops()) closed[static_cast<size_t>(joint)] = tree.gap(y.data(), joint) > 0;
+  return closed;
+}
+
 TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o,
                          const Checkpoint<TreeTrajectory>& so_far) {
   check_options(o, tree.scene().joints.size());
