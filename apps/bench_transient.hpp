@@ -13,7 +13,7 @@ struct TransientBench {
   double tolerance = 0;  // asked for
   double seconds = 0;    // of the integration, the least of up to five within half a second
   double error = 0;      // largest of all outputs (max over time of the difference over max of the output)
-  double hub_error = 0;  // of hub.rotation; NaN in scenes with joints
+  double hub_error = 0;  // of hub.rotation; NaN where there is none
   double energy = 0;     // energy balance
   double simulated = 0;  // [s]
   long steps = 0, evaluations = 0, events = 0;
@@ -24,8 +24,8 @@ struct TransientBench {
 /// modes per boom, without damping, and tumbling, at tolerances 1e-2 to 1e-9. Reference of a scene: another method than
 /// the one judged, at 1e-11 (bdf, or adams where nothing is damped; for that one, exponential, or adams for scenes with
 /// joints). "ida" flies the formulation by multipliers. A method ends where its next tolerance would take longer than
-/// `longest` seconds. Calls `seen` after each row.
-/// @throws InputError for a scene that closes a loop.
+/// `longest` seconds. A scene that closes a loop has one method, which is its own reference. Calls `seen` after each
+/// row.
 std::vector<TransientBench> bench_transient(const std::vector<std::string>& scenes, double longest,
                                             const std::function<void(const TransientBench&)>& seen);
 

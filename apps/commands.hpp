@@ -42,6 +42,7 @@ struct RunArguments {
   bool force = false;          // from a state file that was changed by hand, too
   double checkpoint = 10;      // wall time between two checkpoints [s]
   bool report = false;
+  bool loads = false;  // of every joint, as outputs
   bool no_budget = false;
 };
 

@@ -99,6 +99,16 @@ VectorXd frequencies_hz(const BodyScene& b, int count) {
 
 }  // namespace
 
+std::string not_comparable(const BodyScene& b) {
+  if (!b.is_boom() || b.structure == "rigid") return fmt::format("body {}: it is no flexible boom", b.name);
+  try {
+    uniform_boom(b);
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
 BodyComparison compare_with_eq14(const BodyScene& b, int count, int elements) {
   const eq14::Boom boom = uniform_boom(b);
   BodyComparison r{b.name, {}, {}};
@@ -116,6 +126,8 @@ std::vector<TransientComparison> compare_transients(const Scene& given) {
   scene.error_budget = false;
   const auto fly = [&](const std::string& structure, BeamTheory theory, bool rotary) {
     for (BodyScene& b : scene.bodies) {
+      if (!b.stiffening.empty()) b.stiffening = "off";
+      if (!not_comparable(b).empty()) continue;
       b = with_model(b, theory, rotary);
       b.structure = structure;
     }

@@ -37,7 +37,11 @@ struct BodyComparison {
 /// the effect of rotary inertia and shear. @throws InputError when the body is not one uniform segment.
 BodyComparison compare_with_eq14(const BodyScene&, int count, int elements);
 
-/// One transient of a scene with each model in turn against eq. 14.
+/// Why eq. 14 says nothing of a body; empty: it does.
+std::string not_comparable(const BodyScene&);
+
+/// One transient of a scene with each model of the bodies that are comparable in turn against eq. 14; geometric
+/// stiffness, which eq. 14 does not have, is left out.
 struct TransientComparison {
   std::string model;
   std::vector<OutputDifference> differences;

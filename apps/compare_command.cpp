@@ -87,11 +87,15 @@ int compare_command(const CompareArguments& a, const CommonOptions& common) {
   } else {
     const Scene scene = load_scene(a.body);
     validate(scene);
-    require(!scene.is_tree,
-            fmt::format("{}: a scene with joints cannot be compared with eq. 14; give one of its bodies as "
-                        "a body file",
-                        a.body));
-    bodies = scene.bodies;
+    std::string without;
+    for (const BodyScene& b : scene.bodies) {
+      const std::string why = not_comparable(b);
+      if (why.empty())
+        bodies.push_back(b);
+      else
+        without += "\n  " + why;
+    }
+    require(!bodies.empty(), fmt::format("{}: no body can be compared with eq. 14:{}", a.body, without));
     if (!a.no_transient) transients = compare_transients(scene);
   }
   std::vector<BodyComparison> compared;

@@ -28,7 +28,7 @@ using toml_writer::toml;
 
 namespace {
 
-constexpr std::string_view state_format = "flexboom-state-2";
+constexpr std::string_view state_format = "flexboom-state-3";
 constexpr std::string_view checksum_key = "sha256";
 
 /// The line that holds the checksum of all others, or an empty one behind the end.
@@ -77,26 +77,6 @@ class Names {
 
 }  // namespace
 
-std::vector<std::string> state_names(const System& system) {
-  const Layout& l = system.layout();
-  Names names(l.size);
-  for (size_t i = 0; i < l.body.size(); ++i) {
-    const ReducedBody& body = system.appendages()[i].body;
-    const int place = l.body[i], rate = l.p + l.base + place;
-    names.set(place, body.name + ".gap");
-    names.set(rate, body.name + ".rate");
-    names.set_modes(place + 1, rate + 1, body.n(), body.name);
-  }
-  if (!system.fixed_hub()) {
-    names.set_vector(l.u_begin(), "hub.rate");
-    names.set_vector(l.position(), "hub.position");
-    names.set_quaternion(l.attitude(), "hub.attitude");
-    names.set_vector(l.velocity(), "hub.velocity");
-  }
-  names.set(l.dissipated(), "energy.dissipated");
-  return names.take();
-}
-
 std::vector<std::string> state_names(const Tree& tree) {
   const TreeLayout& l = tree.layout();
   Names names(l.size);
@@ -109,7 +89,7 @@ std::vector<std::string> state_names(const Tree& tree) {
       names.set(at.scalar + k, joint.name + ".gap" + number);
       names.set(l.rate(at.scalar + k), joint.name + ".rate" + number);
     }
-    names.set_vector(at.omega, joint.name + ".omega");
+    names.set_vector(at.omega, joint.name + ".rate");
     names.set_vector(at.position, joint.name + ".position");
     names.set_quaternion(at.attitude, joint.name + ".attitude");
     names.set_vector(at.velocity, joint.name + ".velocity");

@@ -1,7 +1,6 @@
 #pragma once
 
 #include "dynamics/flight.hpp"
-#include "dynamics/system.hpp"
 #include "dynamics/tree.hpp"
 
 #include <Eigen/Core>
@@ -26,8 +25,7 @@ struct FlightState {
   std::map<std::string, double> loops;       // angles of hinges that close loops [rad]: which turn they are in
 };
 
-/// Names of the states of a System or a Tree, in the order of its layout.
-std::vector<std::string> state_names(const System&);
+/// Names of the states of a tree, in the order of its layout.
 std::vector<std::string> state_names(const Tree&);
 
 /// With a checksum of everything else in it.

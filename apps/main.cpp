@@ -78,6 +78,7 @@ struct CommandLine {
     c->add_option("--checkpoint", run.checkpoint, "Wall time between two states on the disk [s]; 10 by default")
         ->check(CLI::NonNegativeNumber);
     c->add_flag("--report", run.report, "Write report.html too");
+    c->add_flag("--loads", run.loads, "Force and torque of every joint as outputs: JOINT.force, JOINT.torque");
     c->add_flag("--no-budget", run.no_budget, "Do not repeat the run to measure its errors");
     c->callback([this] { action = [this] { return run_command(run, common); }; });
   }

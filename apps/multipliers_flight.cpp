@@ -4,7 +4,6 @@
 
 #include "apps/tree_flight.hpp"
 #include "dynamics/formulations.hpp"
-#include "dynamics/multibody_of.hpp"
 #include "fem/stopwatch.hpp"
 
 #include <fmt/format.h>
@@ -73,17 +72,6 @@ void set_energies(MultipliersOptions& o, const Multibody& scene, const TreeLayou
     for (int k = 0; at.losses >= 0 && k < static_cast<int>(law_losses.size()); ++k)
       o.lost.back().push_back(y0[at.losses + k]);
   }
-}
-
-/// Joints number from `first`.
-std::vector<StopEvent> events_of(std::vector<StopEvent> crossings, int first) {
-  for (StopEvent& e : crossings) e.joint -= first;
-  return crossings;
-}
-
-Scene without_loops(Scene scene) {
-  std::erase_if(scene.joints, [](const JointScene& j) { return j.closes_loop; });
-  return scene;
 }
 
 TreeState without_loops(const Scene& scene, TreeState s) {
@@ -189,21 +177,21 @@ struct FlownByMultipliers {
 /// What results are made of: the rows from `first` on that come before `last`, and where the flight is.
 void set_flown(const FlownByMultipliers& f, size_t first, size_t last, const std::vector<Stiffening>& stiffening,
                Run& r) {
-  r.motion = {};
+  r.motion.time.clear(), r.motion.y.clear(), r.motion.balance.clear();
   for (size_t row = first; row < last; ++row) {
     r.motion.time.push_back(f.flight.time[row]);
     r.motion.y.push_back(f.y(row));
+    r.motion.balance.push_back(balance_of(f.tree, f.flight, row, r.motion.y.back()));
   }
-  r.outputs = tree_output_table(f.scene, f.tree, last - first, [&](size_t i) {
+  r.outputs = output_table(f.scene, f.tree, last - first, [&](size_t i) {
     const size_t row = first + i;
-    return TreeMoment{f.flight.time[row], f.states[row], joint_loads(f.system, f.flight.states[row]),
-                      balance_of(f.tree, f.flight, row, r.motion.y[i])};
+    return Moment{f.flight.time[row], f.states[row], joint_loads(f.system, f.flight.states[row]), r.motion.balance[i]};
   });
-  r.warnings = warnings_of(f.scene, f.system.multibody(), f.flight, r.stiffening_effect, stiffening);
+  r.motion.warnings = warnings_of(f.scene, f.system.multibody(), f.flight, r.motion.stiffening_effect, stiffening);
   const MultibodyState& last_state = f.flight.states.back();
   const TreeBalance at_end = balance_of(f.tree, f.flight, f.states.size() - 1, f.y(f.states.size() - 1));
   r.ledger = EnergyOfRun{at_end.kinetic, at_end.potential, at_end.work, last_state.ledger};
-  r.motion.events = events_of(f.flight.events, 0);
+  r.motion.events = f.flight.events;
   r.motion.summary = summary_of(f.flight.summary);
   r.end = end_of(r, f.scene, f.flight.time.back(), f.y(f.states.size() - 1), r.motion.summary);
   for (size_t i = 0; i < f.scene.joints.size(); ++i)
@@ -240,7 +228,7 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
       if (will_be_revised(scene, opened, effect, stiffening)) return;
       add_states(*system, so_far, states);
       Run part = r;
-      part.stiffening_effect = effect;
+      part.motion.stiffening_effect = effect;
       set_flown({scene, *system, *r.tree, so_far, states}, told, outputs, stiffening, part);
       states.resize(outputs);
       part.integrate_seconds = flight_time.seconds();
@@ -263,48 +251,11 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
     return flight.summary.interrupted;
   };
   fly_until_settled(scene, opened, effect, stiffening, fly);
-  r.stiffening_effect = effect;
+  r.motion.stiffening_effect = effect;
   add_states(*system, flight, states);
   set_flown({scene, *system, *r.tree, flight, states}, 0, states.size(), stiffening, r);
   note_moved_starts(scene, asked, states.front(), r.notes);
   r.integrate_seconds = flight_time.seconds();
-  return r;
-}
-
-Trajectory integrate_by_multipliers(const System& of_hub, const VectorXd& start, const IntegratorOptions& options,
-                                    const Checkpoint<Trajectory>& checkpoint) {
-  const Multipliers system(multibody_of(of_hub));
-  const Tree tree(multibody_of(of_hub));
-  const Index motion = of_hub.layout().dissipated();  // up to here both have the same states
-  const int first = of_hub.fixed_hub() ? 0 : 1;       // joint that is a hinge
-  VectorXd y0 = VectorXd::Zero(tree.layout().size);
-  y0.head(motion) = start.head(motion);
-  MultipliersOptions of_flight =
-      multipliers_options(options, start_angles(system.multibody(), tree.unpack(y0), nullptr));
-  of_flight.dissipated = start[motion];
-  if (!options.stops.empty()) of_flight.stops.insert(of_flight.stops.begin(), static_cast<size_t>(first), {});
-  Trajectory r;
-  const auto go_on = [&](const MultibodyTrajectory& flight) {
-    for (size_t row = r.time.size(); row < flight.time.size(); ++row) {
-      VectorXd y(of_hub.layout().size);
-      const MultibodyState& s = flight.states[row];
-      y << tree.pack(tree_state(system, s)).head(motion), s.dissipated - s.work;  // a field's work is all there is
-      r.y.push_back(std::move(y));
-      r.time.push_back(flight.time[row]);
-      r.balance.push_back(flight.balance[row]);
-    }
-    r.events = events_of(flight.events, first);
-    r.summary = summary_of(flight.summary);
-    r.summary.stops.erase(r.summary.stops.begin(), r.summary.stops.begin() + first);
-  };
-  Checkpoint<MultibodyTrajectory> on_the_way;
-  if (checkpoint)
-    on_the_way = [&](const MultibodyTrajectory& so_far, size_t outputs) {
-      go_on(so_far);
-      checkpoint(r, outputs);
-      r.time.resize(outputs), r.y.resize(outputs), r.balance.resize(outputs);
-    };
-  go_on(integrate_multipliers(system, body_states(tree, options.start, y0), of_flight, on_the_way));
   return r;
 }
 

@@ -12,9 +12,4 @@ namespace flexboom {
 /// @throws InputError naming a joint that cannot be closed; NumericalError naming one that locks.
 Run fly_by_multipliers(const Scene&, std::vector<PreparedBody>, const RunHooks&, long max_steps);
 
-/// As `integrate` of a hub with hinged booms: the states are those of its System.
-/// @throws InputError, NumericalError.
-Trajectory integrate_by_multipliers(const System&, const Eigen::VectorXd& y0, const IntegratorOptions&,
-                                    const Checkpoint<Trajectory>& = {});
-
 }  // namespace flexboom

@@ -30,7 +30,8 @@ Axis axis_of(const std::vector<Curve>& curves, bool of_x, bool log) {
       a.low = std::min(a.low, log ? std::log10(v) : v);
       a.high = std::max(a.high, log ? std::log10(v) : v);
     }
-  if (!(a.low < a.high)) {
+  const double round_off = 1e-12 * std::max(std::abs(a.low), std::abs(a.high));
+  if (!(a.high - a.low > round_off)) {
     const double centre = std::isfinite(a.low) ? a.low : 0.0, half = std::max(1e-12, std::abs(centre) * 0.1);
     a.low = centre - half, a.high = centre + half;
   } else if (!of_x) {

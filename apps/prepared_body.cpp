@@ -2,6 +2,7 @@
 
 #include "apps/prepared_body.hpp"
 
+#include "apps/picture.hpp"
 #include "apps/version.hpp"
 #include "fem/assembly.hpp"
 #include "fem/check.hpp"
@@ -33,6 +34,7 @@ PreparedBody prepare_rigid(const BodyScene& b) {
       r.inertia + r.mass * (r.centre.squaredNorm() * Matrix3d::Identity() - r.centre * r.centre.transpose());
   PreparedBody p;
   p.body = rigid_body(b.name, r.mass, r.mass * r.centre, J);
+  p.body.display = box_of(p.body, r.size);
   return p;
 }
 
@@ -49,6 +51,7 @@ PreparedBody prepare_reduced(const BodyScene& b) {
   PreparedBody p = prepared(*b.reduced);
   p.body.name = b.name;
   if (b.damping.name != "none") apply_damping(p.body, b.damping);  // else the file's
+  if (p.body.display.points.cols() == 0) p.body.display = box_of(p.body);
   return p;
 }
 
@@ -171,7 +174,7 @@ PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem:
     if (!c.passed)
       throw NumericalError(fmt::format("body {}: invariant {} = {:.17g}, but {:.17g} by an independent route", b.name,
                                        c.name, c.value, c.reference));
-  if (!file.empty()) write_kept(file, r);
+  if (!file.empty()) write_kept(file, r), r.kept = file;
   return r;
 }
 

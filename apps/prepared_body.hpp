@@ -12,11 +12,11 @@ namespace flexboom {
 /// A body of a scene made ready to fly, with what is known of its quality.
 struct PreparedBody {
   ReducedBody body;
-  int elements = 0;
+  int elements = 0;               // 0 where it was read from a file or is in closed form
   int dofs = 0;                   // unknowns of the model, 0 in closed form
   std::vector<BodyCheck> checks;  // empty in closed form
   EigenSummary eigen;
-  std::filesystem::path kept;  // the file that it was read from, made by an earlier run; empty: made now
+  std::filesystem::path kept;  // the file that later runs read it from; empty: none
 };
 
 /// Geometry -> mesh -> K, M -> modes -> reduced body, or the closed form, or the body that the scene gives.

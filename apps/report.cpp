@@ -1,5 +1,6 @@
 #include "apps/report.hpp"
 
+#include "apps/animation.hpp"
 #include "apps/plot.hpp"
 #include "apps/scene.hpp"
 #include "fem/check.hpp"
@@ -10,9 +11,11 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
+#include <map>
 #include <numbers>
 #include <sstream>
+#include <string_view>
+#include <utility>
 
 namespace flexboom {
 
@@ -23,18 +26,6 @@ namespace {
 
 constexpr double degrees = 180 / std::numbers::pi;
 
-/// Columns of a trajectory.csv by name.
-struct Table {
-  std::vector<std::string> names;
-  std::vector<std::vector<double>> columns;
-
-  const std::vector<double>& column(const std::string& name) const {
-    const auto i = std::find(names.begin(), names.end(), name);
-    require(i != names.end(), fmt::format("trajectory.csv has no column '{}'", name));
-    return columns[static_cast<size_t>(i - names.begin())];
-  }
-};
-
 std::vector<std::string> split(const std::string& line) {
   std::vector<std::string> parts;
   std::istringstream in(line);
@@ -43,34 +34,34 @@ std::vector<std::string> split(const std::string& line) {
 }
 
 /// Of a run that was killed the last line may be a part of one: that is left out.
-Table read_table(const fs::path& path, bool whole) {
+OutputTable read_table(const fs::path& path, bool whole) {
   std::string text = file_bytes(path);
   if (!whole) text.resize(text.rfind('\n') + 1);
   std::istringstream in(text);
   std::string line;
-  Table table;
   std::getline(in, line);
-  table.names = split(line);
-  table.columns.resize(table.names.size());
+  OutputTable table{split(line), {}};
+  std::vector<double> values;
   for (size_t number = 2; std::getline(in, line); ++number) {
     const std::vector<std::string> parts = split(line);
     require(parts.size() == table.names.size(), fmt::format("{}:{}: {} values, the header names {}", path.string(),
                                                             number, parts.size(), table.names.size()));
-    for (size_t i = 0; i < parts.size(); ++i) {
-      double v = 0;
-      const auto [end, error] = std::from_chars(parts[i].data(), parts[i].data() + parts[i].size(), v);
-      require(error == std::errc() && end == parts[i].data() + parts[i].size(),
-              fmt::format("{}:{}: '{}' is not a number", path.string(), number, parts[i]));
-      table.columns[i].push_back(v);
+    for (const std::string& part : parts) {
+      const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), values.emplace_back());
+      require(error == std::errc() && end == part.data() + part.size(),
+              fmt::format("{}:{}: '{}' is not a number", path.string(), number, part));
     }
   }
-  require(!table.columns.empty() && !table.columns[0].empty(), path.string() + ": no rows");
+  require(!values.empty(), path.string() + ": no rows");
+  const auto columns = static_cast<Eigen::Index>(table.names.size());
+  table.values = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+      values.data(), std::ssize(values) / columns, columns);
   return table;
 }
 
 struct Folder {
   Scene scene;
-  Table table;
+  OutputTable table;
   json summary;
 };
 
@@ -99,62 +90,53 @@ std::string status_line(const json& summary) {
                      summary.contains("error") ? ": " + escaped(summary["error"].get<std::string>()) : "");
 }
 
-Curve curve(const Table& table, const std::string& column, const std::string& name, double factor = 1,
-            double offset = 0) {
-  Curve c{name, table.column("t"), table.column(column)};
-  for (double& v : c.y) v = factor * (v - offset);
-  return c;
-}
+/// A plot of the columns whose names end, or begin, so.
+struct PlotOf {
+  const char *title, *y_label;
+  double factor;
+  std::vector<std::string_view> parts;
+};
 
-/// Of a scene with joints: what each output of its joints and bodies does over time.
-std::vector<Plot> tree_plots(const Folder& f) {
-  const Table& t = f.table;
-  std::vector<Plot> all;
-  Plot angles{"Joint angles", "t [s]", "angle [deg]", {}}, lengths{"Sliders", "t [s]", "length [m]", {}};
-  for (const JointScene& j : f.scene.joints) {
-    if (j.kind == JointKind::hinge) angles.curves.push_back(curve(t, j.name + ".angle", j.name, degrees));
-    if (j.kind == JointKind::universal)
-      for (const char* which : {".angle1", ".angle2"})
-        angles.curves.push_back(curve(t, j.name + which, j.name + which, degrees));
-    if (j.kind == JointKind::slider) lengths.curves.push_back(curve(t, j.name + ".length", j.name));
-    if (!joint_type(j.kind).turns) continue;
-    Plot rotation{"Rotation of " + j.name, "t [s]", "rotation vector [deg]", {}};
-    for (const char* axis : {".x", ".y", ".z"})
-      rotation.curves.push_back(curve(t, j.name + ".rotation" + axis, axis + 1, degrees));
-    all.push_back(rotation);
-  }
-  Plot tip{"Elastic tip displacement, axes of the body", "t [s]", "displacement [mm]", {}};
-  for (const BodyScene& b : f.scene.bodies)
-    for (const std::string axis : {".y", ".z"})
-      if (std::find(t.names.begin(), t.names.end(), b.name + ".tip" + axis) != t.names.end())
-        tip.curves.push_back(curve(t, b.name + ".tip" + axis, b.name + axis, 1e3));
-  Plot energy{"Energy", "t [s]", "energy [J]", {}};
-  for (const char* kind : {"kinetic", "elastic", "potential", "dissipated", "work"})
-    energy.curves.push_back(curve(t, std::string("energy.") + kind, kind));
-  for (Plot* p : {&angles, &lengths, &tip, &energy})
-    if (!p->curves.empty()) all.push_back(std::move(*p));
+const std::vector<PlotOf>& plots_of_columns() {
+  static const std::vector<PlotOf> all = {
+      {"Joint angles, from the stop where there is one", "angle [deg]", degrees, {".angle", ".angle1", ".angle2"}},
+      {"Sliders", "length [m]", 1, {".length"}},
+      {"Rotation of bodies from the start", "rotation vector [deg]", degrees, {".rotation."}},
+      {"Attitude in the orbit's frame", "angle [deg]", degrees, {"lvlh."}},
+      {"Pointing: rotation from the attitude that turns command", "rotation vector [deg]", degrees, {".pointing."}},
+      {"Spin of wheels", "spin [rad/s]", 1, {".spin"}},
+      {"Elastic tip displacement, axes of the body", "displacement [mm]", 1e3, {".tip."}},
+      {"Forces of joints, axes of body b", "force [N]", 1, {".force."}},
+      {"Torques of joints, axes of body b", "torque [N m]", 1, {".torque."}},
+      {"Drives of prescribed motions", "[N m], [N]", 1, {".drive", ".drive1", ".drive2"}},
+      {"Energy", "energy [J]", 1, {"energy."}}};
   return all;
 }
 
+bool is_part(std::string_view column, std::string_view part) {
+  return part.ends_with('.') ? column.find(part) != column.npos : column.ends_with(part);
+}
+
+/// Columns that stay zero are left out.
 std::vector<Plot> plots(const Folder& f) {
-  if (f.scene.is_tree) return tree_plots(f);
-  const Table& t = f.table;
+  std::map<std::string, double> stops;  // angles [rad], by column
+  for (const JointScene& j : with_joints(f.scene).joints)
+    if (j.kind == JointKind::hinge && j.mechanism.stop_stiffness > 0) stops[j.name + ".angle"] = j.mechanism.threshold;
+  const auto column = [&f](size_t i) { return f.table.values.col(static_cast<Eigen::Index>(i)); };
+  const std::vector<double> t(column(0).begin(), column(0).end());
   std::vector<Plot> all;
-  Plot rotation{"Hub rotation from the start", "t [s]", "rotation vector [deg]", {}};
-  for (const char* axis : {"x", "y", "z"})
-    rotation.curves.push_back(curve(t, std::string("hub.rotation.") + axis, axis, degrees));
-  all.push_back(rotation);
-  Plot angle{"Hinge angle, from the stop", "t [s]", "Theta - threshold [deg]", {}};
-  for (const HingeScene& h : f.scene.hinges)
-    angle.curves.push_back(curve(t, h.body + ".angle", h.body, degrees, h.hinge.mechanism.threshold));
-  if (!angle.curves.empty()) all.push_back(angle);
-  Plot tip{"Elastic tip deflection in the hinge plane", "t [s]", "tip.y [mm]", {}};
-  for (const HingeScene& h : f.scene.hinges) tip.curves.push_back(curve(t, h.body + ".tip.y", h.body, 1e3));
-  if (!tip.curves.empty()) all.push_back(tip);
-  Plot energy{"Energy", "t [s]", "energy [J]", {}};
-  for (const char* kind : {"kinetic", "elastic", "dissipated"})
-    energy.curves.push_back(curve(t, std::string("energy.") + kind, kind));
-  all.push_back(energy);
+  for (const PlotOf& p : plots_of_columns()) {
+    Plot plot{p.title, "t [s]", p.y_label, {}};
+    for (size_t i = 1; i < f.table.names.size(); ++i) {
+      const std::string& name = f.table.names[i];
+      if (std::ranges::none_of(p.parts, [&](auto part) { return is_part(name, part); }) || column(i).isZero(0))
+        continue;
+      const double zero = stops.contains(name) ? stops[name] : 0;
+      Curve& curve = plot.curves.emplace_back(Curve{name, t, {}});
+      for (const double v : column(i)) curve.y.push_back(p.factor * (v - zero));
+    }
+    if (!plot.curves.empty()) all.push_back(std::move(plot));
+  }
   return all;
 }
 
@@ -185,71 +167,30 @@ std::string bodies_table(const json& bodies) {
   return r + "</table>\n";
 }
 
-/// Data of the moving picture: per boom its hinge and length, per frame time, hub rotation, hinge angles and tip
-/// deflections.
-json animation_data(const Folder& f) {
-  constexpr size_t most_frames = 600;
-  json booms = json::array();
-  for (const HingeScene& h : f.scene.hinges) {
-    const auto b = std::find_if(f.scene.bodies.begin(), f.scene.bodies.end(),
-                                [&](const BodyScene& s) { return s.name == h.body; });
-    const auto v = [](const Eigen::Vector3d& a) { return json{a.x(), a.y(), a.z()}; };
-    booms.push_back({{"name", h.body},
-                     {"point", v(h.hinge.point)},
-                     {"s", v(h.hinge.stowed)},
-                     {"n", v(h.hinge.outward)},
-                     {"length", b == f.scene.bodies.end() ? 0.0 : b->geometry.length()}});
-  }
-  const std::vector<double>& t = f.table.column("t");
-  const size_t stride = std::max<size_t>(1, t.size() / most_frames);
-  json frames = json::array();
-  double most = 0;
-  for (size_t i = 0; i < t.size(); i += stride) {
-    json frame = {t[i]};
-    for (const char* axis : {"x", "y", "z"}) frame.push_back(f.table.column(std::string("hub.rotation.") + axis)[i]);
-    for (const HingeScene& h : f.scene.hinges) {
-      const double tip = f.table.column(h.body + ".tip.y")[i];
-      most = std::max(most, std::abs(tip));
-      frame.push_back(f.table.column(h.body + ".angle")[i]);
-      frame.push_back(tip);
-    }
-    frames.push_back(frame);
-  }
-  const double exaggeration = most > 0 ? std::pow(10, std::floor(std::log10(0.1 / most))) : 1;
-  const Eigen::Vector3d& size = f.scene.hub.size;
-  return {{"size", {size.x(), size.y(), size.z()}},
-          {"booms", booms},
-          {"frames", frames},
-          {"deflection", std::max(1.0, exaggeration)},
-          {"rotation", 30}};
-}
-
 constexpr const char* style =
     R"(<style>body{font:15px sans-serif;max-width:820px;margin:2em auto;color:#222}table{border-collapse:collapse;margin:1em 0}
 td,th{border:1px solid #ccc;padding:3px 9px;text-align:left;font-variant-numeric:tabular-nums}th{background:#f4f4f4;font-weight:600}
-canvas{border:1px solid #ccc;width:100%}li{margin:.2em 0}</style>)";
+canvas{border:1px solid #ccc;width:100%;touch-action:none}input[type=range]{width:100%}li{margin:.2em 0}</style>)";
 
-// Orthographic view; boom curves are drawn with the static bending line of a tip force scaled to the tip deflection.
-constexpr const char* player = R"(<script>
-const c=document.getElementById('view'),g=c.getContext('2d'),R=(a,b,t)=>{const q=Math.hypot(...a)||1e-30,k=a.map(v=>v/q),s=Math.sin(q*t),o=Math.cos(q*t),
-d=k[0]*b[0]+k[1]*b[1]+k[2]*b[2];return[0,1,2].map(i=>b[i]*o+(k[(i+1)%3]*b[(i+2)%3]-k[(i+2)%3]*b[(i+1)%3])*s+k[i]*d*(1-o));};
-const P=v=>[410+560*(.80*v[0]+.60*v[2]),210-560*(.85*v[1]+.32*v[0]-.42*v[2])];
-let n=0,run=true;c.onclick=()=>run=!run;
-function line(a,col,w){g.beginPath();a.forEach((v,i)=>{const p=P(v);i?g.lineTo(...p):g.moveTo(...p)});g.strokeStyle=col;g.lineWidth=w;g.stroke();}
-function draw(){const f=D.frames[n],r=f.slice(1,4),T=v=>R(r,v,D.rotation);g.clearRect(0,0,c.width,c.height);
-const h=D.size.map(v=>v/2);for(const z of[-1,1])line([[-1,-1],[1,-1],[1,1],[-1,1],[-1,-1]].map(([x,y])=>T([x*h[0],y*h[1],z*h[2]])),'#444',1);
-for(const[x,y]of[[-1,-1],[1,-1],[1,1],[-1,1]])line([-1,1].map(z=>T([x*h[0],y*h[1],z*h[2]])),'#444',1);
-D.booms.forEach((b,i)=>{const th=f[4+2*i],w=f[5+2*i]*D.deflection,C=Math.cos(th),S=Math.sin(th),pts=[];
-for(let k=0;k<=20;k++){const x=k/20,y=w*x*x*(3-x)/2;pts.push(T([0,1,2].map(j=>b.point[j]+b.length*x*(C*b.s[j]+S*b.n[j])+y*(C*b.n[j]-S*b.s[j]))));}
-line(pts,['#0072b2','#d55e00','#009e73','#cc79a7','#e69f00','#56b4e9'][i%6],3);});
-g.fillStyle='#222';g.font='14px sans-serif';g.fillText('t = '+f[0].toFixed(3)+' s',12,20);
-if(run)n=(n+1)%D.frames.length;requestAnimationFrame(draw);}draw();</script>)";
+/// Where bodies that take long are kept, if they are.
+fs::path kept_in(const json& summary) {
+  for (const json& body : summary.at("bodies"))
+    if (body.contains("kept")) return fs::path(body["kept"].get<std::string>()).parent_path();
+  return {};
+}
+
+/// A page without a picture is better than none.
+std::string picture_html(const Folder& f) {
+  try {
+    return animation_html(f.scene, f.table, kept_in(f.summary));
+  } catch (const std::runtime_error& e) {
+    return fmt::format("<p>There is no moving picture: {}</p>\n", escaped(e.what()));
+  }
+}
 
 /// @throws json::exception when the summary lacks something.
 std::string page(const Folder& f) {
   const json& s = f.summary;
-  const json data =
-      f.scene.is_tree ? json() : animation_data(f);  // the moving picture knows hubs with hinged booms only
   std::string h = fmt::format(
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>flexboom: "
       "{0}</title>{1}</head><body>\n<h1>{0}</h1>\n",
@@ -258,11 +199,7 @@ std::string page(const Folder& f) {
   h += fmt::format("<p>{} s simulated in {} s ({} times real time), {} steps, {} contacts and releases.</p>\n",
                    cell(s.at("simulated_seconds")), cell(s.at("seconds").at("integrate")),
                    cell(s.at("real_time_factor")), cell(s.at("steps")), cell(s.at("events")));
-  if (!f.scene.is_tree)
-    h += fmt::format(
-        "<canvas id=\"view\" width=\"820\" height=\"420\"></canvas><p>Drawn larger than it is: hub rotation {} times, "
-        "boom deflection {} times. Click to stop or go on.</p>\n",
-        cell(data.at("rotation")), cell(data.at("deflection")));
+  h += picture_html(f);
   for (const Plot& p : plots(f)) h += svg(p);
   h += "<h2>How wrong is it?</h2>\n<table>" + rows(s.at("error_budget")) +
        fmt::format("<tr><th>energy balance</th><td>{}</td></tr><tr><th>momentum drift</th><td>{}</td></tr></table>\n",
@@ -271,8 +208,7 @@ std::string page(const Folder& f) {
   for (const json& line : s.at("plan")) h += "<li>" + escaped(line.get<std::string>()) + "</li>\n";
   for (const json& line : s.at("warnings")) h += "<li><b>warning:</b> " + escaped(line.get<std::string>()) + "</li>\n";
   h += "</ul><h2>The run</h2><table>" + rows(s) + rows(s.at("seconds"), "wall seconds: ") + "</table>\n";
-  if (f.scene.is_tree) return h + "</body></html>\n";
-  return h + "<script>const D=" + data.dump() + ";</script>" + player + "</body></html>\n";
+  return h + "</body></html>\n";
 }
 
 }  // namespace
@@ -286,15 +222,6 @@ std::string report_html(const fs::path& folder) {
   }
 }
 
-std::string overview_svg(const fs::path& folder) {
-  const std::vector<Plot> all = plots(read_folder(folder));
-  const int height = all.front().height;
-  std::string s =
-      fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\">\n",
-                  all.front().width, height * static_cast<int>(all.size()));
-  for (size_t i = 0; i < all.size(); ++i)
-    s += fmt::format("<g transform=\"translate(0 {})\">{}</g>\n", static_cast<int>(i) * height, svg(all[i]));
-  return s + "</svg>\n";
-}
+std::string overview_svg(const fs::path& folder) { return stacked(plots(read_folder(folder))); }
 
 }  // namespace flexboom

@@ -1,8 +1,8 @@
 #include "apps/results.hpp"
 
+#include "apps/picture.hpp"
 #include "apps/tree_flight.hpp"
 #include "apps/version.hpp"
-#include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
 #include "fem/vtk.hpp"
@@ -11,18 +11,12 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
-#include <functional>
 #include <iterator>
-#include <numbers>
-#include <optional>
 #include <utility>
 
 namespace flexboom {
 
 namespace fs = std::filesystem;
-using Eigen::Matrix3d;
-using Eigen::Matrix3Xd;
-using Eigen::Vector3d;
 using nlohmann::ordered_json;
 
 void prepare_folder(const fs::path& folder) {
@@ -45,20 +39,8 @@ void print_rows(std::ostream& out, const OutputTable& table, size_t first) {
   }
 }
 
-namespace {
-
-/// Names that the events of a run number: bodies on hinges of the hub, or joints.
-std::vector<std::string> hinge_names(const RunResult& r) {
-  if (r.scene.is_tree) return joint_names(r.scene);
-  std::vector<std::string> names;
-  for (const PreparedBody& p : r.bodies) names.push_back(p.body.name);
-  return names;
-}
-
-}  // namespace
-
 std::string event_rows(const RunResult& r, size_t first) {
-  const std::vector<std::string> hinges = hinge_names(r);
+  const std::vector<std::string> hinges = joint_names(with_joints(r.scene));
   std::string out;
   for (size_t i = first; i < r.trajectory.events.size(); ++i) {
     const StopEvent& e = r.trajectory.events[i];
@@ -107,6 +89,7 @@ ordered_json bodies_json(const RunResult& r) {
                       {"modes", p.body.n()},
                       {"frequencies_hz", hz},
                       {"mass", p.body.m}});
+    if (!p.kept.empty()) bodies.back()["kept"] = fs::absolute(p.kept).string();
   }
   return bodies;
 }
@@ -162,64 +145,6 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   return j;
 }
 
-Pose pose_at(const Scene& scene, const System& system, const Eigen::VectorXd& y) {
-  const State s = system.unpack(y);
-  const Matrix3d A = scene.hub.fixed ? Matrix3d::Identity() : rotation_matrix(s.attitude);
-  Pose pose;
-  pose.hub.resize(3, 8);
-  for (int c = 0; c < 8; ++c) {  // VTK's order of a hexahedron
-    const Vector3d corner((c & 1) != ((c >> 1) & 1) ? 0.5 : -0.5, (c & 2) ? 0.5 : -0.5, (c & 4) ? 0.5 : -0.5);
-    pose.hub.col(c) = s.position + A * corner.cwiseProduct(scene.hub.size);
-  }
-  for (size_t b = 0; b < system.appendages().size(); ++b) {
-    const Appendage& a = system.appendages()[b];
-    const Matrix3d C = A * system.boom_to_hub(static_cast<int>(b), s.angle[b]);
-    Matrix3Xd points = a.body.display.points, moved = Matrix3Xd::Zero(3, points.cols());
-    for (Eigen::Index i = 0; i < points.cols(); ++i) {
-      if (a.body.n()) moved.col(i) = C * (a.body.display.S[static_cast<size_t>(i)] * s.q[b]);
-      points.col(i) = s.position + A * a.hinge.point + C * points.col(i) + moved.col(i);
-    }
-    pose.booms.push_back(std::move(points));
-    pose.deflection.push_back(std::move(moved));
-  }
-  return pose;
-}
-
-namespace {
-
-constexpr int cell_line = 3, cell_hexahedron = 12;  // lines of two points: meshio skips polylines
-
-/// The whole scene at one time as one grid; cell data "body" numbers hub and booms from 0.
-VtkGrid grid_of(const Pose& pose, const System& system) {
-  VtkGrid grid;
-  Eigen::Index total = pose.hub.cols();
-  for (const Matrix3Xd& boom : pose.booms) total += boom.cols();
-  grid.points.resize(3, total);
-  Eigen::MatrixXd displacement = Eigen::MatrixXd::Zero(3, total);
-  std::vector<double> body;
-  grid.points.leftCols(8) = pose.hub;
-  grid.cells.push_back({cell_hexahedron, {0, 1, 2, 3, 4, 5, 6, 7}});
-  body.push_back(0);
-  Eigen::Index at = 8;
-  for (size_t b = 0; b < pose.booms.size(); ++b) {
-    grid.points.middleCols(at, pose.booms[b].cols()) = pose.booms[b];
-    displacement.middleCols(at, pose.booms[b].cols()) = pose.deflection[b];
-    for (const std::vector<int>& line : system.appendages()[b].body.display.lines) {
-      for (size_t k = 0; k + 1 < line.size(); ++k) {
-        grid.cells.push_back({cell_line, {line[k] + static_cast<int>(at), line[k + 1] + static_cast<int>(at)}});
-        body.push_back(static_cast<double>(b + 1));
-      }
-    }
-    at += pose.booms[b].cols();
-  }
-  grid.point_data.emplace_back("displacement", displacement);
-  grid.cell_data.emplace_back("body",
-                              Eigen::Map<Eigen::RowVectorXd>(body.data(), static_cast<Eigen::Index>(body.size())));
-  return grid;
-}
-
-}  // namespace
-
 void MotionFrames::add(std::pair<double, std::string> frame, double vtu_step) {
   const double t = frame.first;
   if (vtu_step > 0) next += vtu_step * std::max(1.0, std::ceil((t - next) / vtu_step + 1e-9));
@@ -233,17 +158,11 @@ bool is_motion_frame(const std::string& name) {
 }
 
 void write_motion(const RunResult& r, const fs::path& folder, MotionFrames& frames) {
-  std::function<VtkGrid(size_t)> grid = [&r](size_t row) { return tree_picture(r, row); };
-  std::optional<Flyable> f;
-  if (!r.scene.is_tree) {
-    f.emplace(make_system(r.scene, r.bodies));
-    grid = [&](size_t row) { return grid_of(pose_at(r.scene, f->system, r.trajectory.y[row]), f->system); };
-  }
   for (size_t i = 0; i < r.trajectory.time.size(); ++i) {
     const double t = r.trajectory.time[i];
     if (t < frames.next - 1e-9 * r.scene.vtu_step) continue;
     const std::string name = fmt::format("motion_{:05d}.vtu", frames.files.size());
-    write_vtu(folder / name, grid(i));
+    write_vtu(folder / name, picture(*r.tree, t, r.trajectory.y[i]));
     frames.add({t, name}, r.scene.vtu_step);
   }
   write_pvd(folder / "motion.pvd", frames.files);

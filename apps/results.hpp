@@ -2,7 +2,6 @@
 
 #include "apps/simulate.hpp"
 #include "fem/files.hpp"
-#include "fem/vtk.hpp"
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -43,13 +42,5 @@ bool is_motion_frame(const std::string& name);
 /// motion.pvd and motion_NNNNN.vtu, bodies in inertial axes: a frame per vtu_step of the scene, behind those that are
 /// there.
 void write_motion(const RunResult&, const std::filesystem::path& folder, MotionFrames&);
-
-/// Points of the hub's box and the deformed booms at a state, inertial axes [m]; used by the VTU files and the report.
-struct Pose {
-  Eigen::Matrix3Xd hub;                      // 8 corners
-  std::vector<Eigen::Matrix3Xd> booms;       // one curve each
-  std::vector<Eigen::Matrix3Xd> deflection;  // elastic displacement at the same points, inertial axes
-};
-Pose pose_at(const Scene&, const System&, const Eigen::VectorXd& y);
 
 }  // namespace flexboom

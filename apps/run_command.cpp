@@ -143,6 +143,10 @@ Scene scene_of(const RunArguments& a) {
     for (BodyScene& b : scene.bodies)
       if (b.is_boom()) b.structure = *a.structure;
   if (a.no_budget) scene.error_budget = false;
+  if (a.loads) {
+    for (HingeScene& h : scene.hinges) h.loads = true;
+    for (JointScene& j : scene.joints) j.loads = j.kind != JointKind::free;
+  }
   if (!a.from.empty()) go_on(scene, a);
   validate(scene);
   return scene;

@@ -313,6 +313,7 @@ HingeScene read_hinge(TableReader table) {
   hinge.law = read_law(table);
   hinge.start_angle = table.number("start_angle", mechanism.rest);
   hinge.start_rate = table.number("start_rate", hinge.start_rate);
+  hinge.loads = table.boolean("loads", hinge.loads);
   table.reject_unknown();
   return hinge;
 }
@@ -408,11 +409,12 @@ void write_out_shorthand(Scene& scene) {
   for (const HingeScene& h : scene.hinges) {
     JointScene joint;
     joint.name = h.body;
-    joint.a = {.body = hub, .point = h.hinge.point, .x = h.hinge.stowed};
+    joint.a = {.body = hub, .marker = {}, .point = h.hinge.point, .x = h.hinge.stowed};
     joint.a.z = h.hinge.stowed.cross(h.hinge.outward).normalized();
     joint.b.body = h.body;
     joint.mechanism = h.hinge.mechanism, joint.law = h.law;
     joint.start = {h.start_angle}, joint.start_rate = {h.start_rate};
+    joint.loads = h.loads;
     scene.joints.push_back(std::move(joint));
   }
   scene.hub = {}, scene.hinges.clear();
@@ -453,6 +455,11 @@ Vector3d normal_to(const Vector3d& direction, const Vector3d& unit) {
   constexpr double round_off = 8 * std::numeric_limits<double>::epsilon();
   if (!(cosine > round_off && cosine <= repairable_direction)) return direction;
   return (direction - direction.dot(unit) * unit).normalized();
+}
+
+Scene with_joints(Scene scene) {
+  if (!std::exchange(scene.is_tree, true)) write_out_shorthand(scene);
+  return scene;
 }
 
 double OrbitScene::rate() const {

@@ -64,6 +64,7 @@ struct HingeScene {
   JointLaw law;            // beside its mechanism; then the scene is one with joints
   double start_angle = 0;  // [rad]
   double start_rate = 0;   // [rad/s]
+  bool loads = false;      // are its force and torque outputs?
 };
 
 /// Orbit of the reference point: for attitude in the local-vertical local-horizontal frame (z to the Earth, y against
@@ -124,6 +125,9 @@ BodyScene read_body(const std::filesystem::path&);
 
 /// A path, or the name of a built-in scene ("sport"). @throws InputError listing the built-in names.
 Scene load_scene(const std::string& path_or_name);
+
+/// What is simulated: hub and hinges written out as a rigid body that flies and joints. A scene of joints as it is.
+Scene with_joints(Scene);
 
 /// Text of a built-in scene, nullptr if there is none of that name. The text is the commented file in meshes/.
 const char* builtin_scene(const std::string& name);

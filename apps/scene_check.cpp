@@ -55,12 +55,7 @@ void check_accuracy(Faults& faults, const Scene& scene) {
     faults.add("accuracy.tolerance",
                fmt::format("is {}; it must be {:g} or more, which is what double precision leaves, and at most 0.1",
                            scene.tolerance, least));
-  std::vector<std::string> known = {"hub.rotation", "hub.rate", "hub.position"};
-  for (const BodyScene& body : scene.bodies) {
-    for (const char* of_body : {".angle", ".rate", ".tip"}) known.push_back(body.name + of_body);
-    if (body.is_elastic()) known.push_back(body.name + ".q");
-  }
-  if (scene.is_tree) known = tree_outputs(scene);
+  const std::vector<std::string> known = outputs_of(with_joints(scene));
   const std::vector<std::string_view> names(known.begin(), known.end());
   if (!body_names_known(faults, scene)) return;
   for (const std::string& output : scene.outputs) {

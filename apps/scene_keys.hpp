@@ -96,7 +96,7 @@ std::set<std::string> keys_known(const std::string& scene, const std::filesystem
 std::vector<std::string> marker_names(const BodyScene&);
 
 /// Columns of a scene with joints, a vector being one output: "arm.angle", "arm.q", "arm.tip".
-std::vector<std::string> tree_outputs(const Scene&);
+std::vector<std::string> outputs_of(const Scene&);
 
 /// A direction rounded by hand or by arithmetic is made a unit vector; one that is so to round-off stays bit for bit,
 /// so that a scene that was written out reads back the same.

@@ -110,6 +110,7 @@ void write_hinge(Writer& out, const HingeScene& scene) {
   out.key("threshold", mechanism.threshold, "rad");
   out.key("start_angle", scene.start_angle, "rad");
   out.key("start_rate", scene.start_rate, "rad/s");
+  out.key("loads", scene.loads);
 }
 
 void write_orbit(Writer& out, const OrbitScene& orbit) {

@@ -3,7 +3,6 @@
 #include "apps/deflection.hpp"
 #include "apps/error_budget.hpp"
 #include "apps/multipliers_flight.hpp"
-#include "apps/scene_orbit.hpp"
 #include "apps/tree_flight.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
@@ -26,113 +25,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// Where the mass centre of all bodies lies from the hub's origin, hub axes.
-Vector3d mass_centre(const System& system, const State& s) {
-  double m = system.hub().m;
-  Vector3d moment = system.hub().mc0;
-  for (size_t i = 0; i < system.appendages().size(); ++i) {
-    const Appendage& a = system.appendages()[i];
-    m += a.body.m;
-    moment += a.body.m * a.hinge.point + system.boom_to_hub(static_cast<int>(i), s.angle[i]) * a.body.mc0;
-  }
-  return moment / m;
-}
-
-}  // namespace
-
-Flyable make_system(const Scene& scene, const std::vector<PreparedBody>& bodies) {
-  require(!scene.is_tree,
-          fmt::format("scene {} has joints; only scenes of one hub with hinges can do this", scene.name));
-  // A hub that does not move needs no mass.
-  ReducedBody hub =
-      scene.hub.fixed ? ReducedBody{} : rigid_body("hub", scene.hub.mass, Vector3d::Zero(), scene.hub.inertia);
-  std::vector<Appendage> appendages;
-  std::vector<double> angles;
-  for (const PreparedBody& p : bodies) {
-    const auto h = std::find_if(scene.hinges.begin(), scene.hinges.end(),
-                                [&](const HingeScene& s) { return s.body == p.body.name; });
-    require(h != scene.hinges.end(), fmt::format("body {} has no hinge", p.body.name));
-    appendages.push_back({p.body, h->hinge});
-    appendages.back().hinge.name = p.body.name;
-    angles.push_back(h->start_angle);
-  }
-  std::optional<OrbitalField> field = field_of(scene);
-  const bool in_field = field.has_value();
-  System system(std::move(hub), std::move(appendages), scene.hub.fixed, std::move(field));
-  State start = system.at_rest(angles);
-  if (in_field) start.position = -mass_centre(system, start);  // the mass centre follows the orbit
-  start.omega = scene.start_rate;
-  start.velocity = scene.start_velocity;
-  for (size_t i = 0; i < bodies.size(); ++i)
-    for (const HingeScene& h : scene.hinges)
-      if (h.body == bodies[i].body.name) start.rate[i] = h.start_rate;
-  VectorXd y0 = system.pack(start);
-  return {std::move(system), std::move(y0)};
-}
-
-namespace {
-
-void add_vector(std::vector<std::string>& names, const std::string& stem) {
-  for (const char* axis : {".x", ".y", ".z"}) names.push_back(stem + axis);
-}
-
-std::vector<std::string> output_names(const Scene& scene, const System& system) {
-  std::vector<std::string> names = {"t"};
-  for (const char* stem : {"hub.rotation", "hub.rate", "hub.position"}) add_vector(names, stem);
-  if (scene.orbit)
-    for (const char* name : {"lvlh.roll", "lvlh.pitch", "lvlh.yaw"}) names.emplace_back(name);
-  for (const Appendage& a : system.appendages()) {
-    const std::string& name = a.body.name;
-    names.push_back(name + ".angle");
-    names.push_back(name + ".rate");
-    for (int k = 1; k <= a.body.n(); ++k) names.push_back(fmt::format("{}.q{}", name, k));
-    add_vector(names, name + ".tip");
-  }
-  for (const char* name : {"energy.kinetic", "energy.elastic", "energy.dissipated"}) names.emplace_back(name);
-  return names;
-}
-
-}  // namespace
-
-OutputTable output_table(const Scene& scene, const Flyable& f, const Trajectory& motion) {
-  const System& system = f.system;
-  OutputTable table{output_names(scene, system), {}};
-  const auto rows = static_cast<Eigen::Index>(motion.time.size());
-  table.values.resize(rows, static_cast<Eigen::Index>(table.names.size()));
-  const State start = system.unpack(f.y0);
-  Eigen::Vector4d back = start.attitude;
-  back.tail<3>() *= -1;
-  std::optional<Orbit> orbit;
-  if (scene.orbit) orbit = orbit_of(scene);
-  for (Eigen::Index row = 0; row < rows; ++row) {
-    const auto i = static_cast<size_t>(row);
-    const State s = system.unpack(motion.y[i]);
-    Eigen::Index column = 0;
-    const auto put = [&](double value) { table.values(row, column++) = value; };
-    const auto put_vector = [&](const Vector3d& v) { put(v.x()), put(v.y()), put(v.z()); };
-    const Vector3d rotation = rotation_vector(quaternion_product(back, s.attitude));
-    put(motion.time[i]);
-    put_vector(rotation);
-    put_vector(s.omega);
-    put_vector(s.position - start.position);
-    if (orbit) put_vector(lvlh_angles(quaternion_product(back, s.attitude), *orbit, motion.time[i]));
-    for (size_t b = 0; b < system.appendages().size(); ++b) {
-      put(s.angle[b]);
-      put(s.rate[b]);
-      for (const double q : s.q[b]) put(q);
-      const ReducedBody& body = system.appendages()[b].body;
-      const Marker* tip = tip_of(body);
-      put_vector(tip ? displacement(body, *tip, s.q[b], Stiffening::off) : Vector3d::Zero());
-    }
-    put(motion.balance[i].kinetic);
-    put(motion.balance[i].elastic);
-    put(s.dissipated);
-  }
-  return table;
-}
-
-namespace {
-
 /// "sip.q2" -> "sip.q", "hub.rotation.x" -> "hub.rotation", "sip.angle" -> "sip.angle".
 std::string output_of_column(const std::string& column) {
   const auto dot = column.rfind('.');
@@ -152,13 +44,7 @@ bool is_wanted(const std::string& output, const std::vector<std::string>& wanted
 /// Angle of the rotation that leads from one rotation vector to another: their difference jumps where the angle passes
 /// pi.
 double angle_between(const Vector3d& a, const Vector3d& b) {
-  const auto quaternion = [](const Vector3d& r) {
-    const double angle = r.norm();
-    Eigen::Vector4d q;
-    q << std::cos(angle / 2), (angle > 0 ? std::sin(angle / 2) / angle : 0.5) * r;
-    return q;
-  };
-  return rotation_vector(quaternion_product(quaternion(-a), quaternion(b))).norm();
+  return rotation_vector(quaternion_product(quaternion_of(-a), quaternion_of(b))).norm();
 }
 
 }  // namespace
@@ -184,7 +70,7 @@ std::vector<OutputDifference> compare_outputs(const OutputTable& a, const Output
         u[static_cast<Eigen::Index>(k)] = a.values(row, columns[output][k].first);
         v[static_cast<Eigen::Index>(k)] = b.values(row, columns[output][k].second);
       }
-      difference = std::max(difference, output == "hub.rotation" ? angle_between(u, v) : (u - v).norm());
+      difference = std::max(difference, output.ends_with(".rotation") ? angle_between(u, v) : (u - v).norm());
       size = std::max(size, v.norm());
     }
     result.push_back({output, size > 0 ? difference / size : difference});
@@ -227,81 +113,26 @@ FlightState end_of(const std::vector<PreparedBody>& bodies, double time, const V
 
 namespace {
 
-std::vector<std::string> hinge_names(const System& system) {
-  std::vector<std::string> names;
-  for (const Appendage& a : system.appendages()) names.push_back(a.body.name);
-  return names;
-}
-
-FlightState end_of(const Flyable& f, const std::vector<PreparedBody>& bodies, const Trajectory& flight) {
-  FlightState end = end_of(bodies, flight.time.back(), flight.y.back(), flight.summary.largest);
-  end.names = state_names(f.system);
-  const std::vector<StopHistory>& stops = flight.summary.stops;
-  for (size_t i = 0; i < stops.size(); ++i) end.stops[f.system.appendages()[i].body.name] = stops[i];
-  return end;
-}
-
-}  // namespace
-
-namespace {
-
-Run fly_hub(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
-  const Stopwatch start;
-  Run r;
-  r.bodies = std::move(bodies);
-  const Flyable f = make_system(scene, r.bodies);
-  const bool redundant = scene.formulation == "multipliers";
-  IntegratorOptions options = integrator_options(scene, hooks, redundant ? "ida" : "exponential", max_steps);
-  VectorXd y = f.y0;
-  if (scene.from) {
-    y = scene.from->values(state_names(f.system));
-    options.stops = scene.from->stops(hinge_names(f.system));
-  }
-  r.prepare_seconds = start.seconds();
-  const Stopwatch watch;
-  Checkpoint<Trajectory> checkpoint;
-  size_t told = 0;
-  if (hooks.checkpoint)
-    checkpoint = [&](const Trajectory& so_far, size_t outputs) {
-      Run part = r;
-      part.motion = rows_of(so_far, told, outputs);
-      part.outputs = output_table(scene, f, part.motion);
-      part.end = end_of(f, r.bodies, so_far);
-      part.integrate_seconds = watch.seconds();
-      hooks.checkpoint(std::move(part), std::exchange(told, outputs));
-    };
-  r.motion = redundant ? integrate_by_multipliers(f.system, y, options, checkpoint)
-                       : integrate(f.system, y, options, checkpoint);
-  r.integrate_seconds = watch.seconds();
-  r.outputs = output_table(scene, f, r.motion);
-  r.end = end_of(f, r.bodies, r.motion);
-  return r;
-}
-
-/// Does a boom of a hub turn so fast that its geometric stiffness may be as large as its own?
-bool spins_fast(const Run& run) {
+/// Does a body whose model leaves geometric stiffness out turn so fast that it may be as large as its own?
+bool spins_fast(const Run& run, size_t body) {
   constexpr double fast = 0.3;  // (Omega / omega_1)^2
-  const Eigen::MatrixXd& rows = run.outputs.values;
-  const auto hub = std::ranges::find(run.outputs.names, "hub.rate.x") - run.outputs.names.begin();
-  return std::ranges::any_of(run.bodies, [&](const PreparedBody& p) {
-    if (p.body.n() == 0) return false;
-    const auto rate = std::ranges::find(run.outputs.names, p.body.name + ".rate") - run.outputs.names.begin();
-    const double spin = (rows.middleCols<3>(hub).rowwise().norm() + rows.col(rate).cwiseAbs()).maxCoeff();
-    return spin * spin * p.body.Me(0, 0) > fast * p.body.Ke(0, 0);
-  });
+  const ReducedBody& b = run.bodies[body].body;
+  return b.n() > 0 && std::pow(largest_rate(run, body), 2) * b.Me(0, 0) > fast * b.Ke(0, 0);
 }
 
-/// The equations of a hub have no geometric stiffness; where it may matter its size is looked at.
+/// Where geometric stiffness is left out of the model and may matter its size is looked at.
 std::vector<std::string> softening_warnings(Scene scene, const Run& run) {
-  std::vector<PreparedBody> bodies;
-  for (BodyScene& b : scene.bodies) {
-    if (b.structure == "beam") b.stiffening = "on";
-    bodies.push_back(prepare_body(b));
+  std::vector<PreparedBody> bodies = run.bodies;
+  bool any = false;
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    BodyScene& b = scene.bodies[i];
+    if (!b.stiffening.empty() || !b.is_boom() || b.structure == "eq14" || !spins_fast(run, i)) continue;
+    b.stiffening = "on", any = true;
+    bodies[i] = prepare_body(b, 0, scene.bodies_kept_in);
   }
-  const Flyable f = make_system(scene, bodies);
-  Multibody names;
-  for (const PreparedBody& p : bodies) names.bodies.push_back(p.body);
-  return stiffening_warnings(names, stiffening_of_hub(f.system, run.motion), scene.tolerance,
+  if (!any) return {};
+  const Multibody multibody = make_multibody(scene, bodies);
+  return stiffening_warnings(multibody, largest_stiffening(Tree(multibody), run.motion), scene.tolerance,
                              [](int) { return Stiffening::off; });
 }
 
@@ -324,12 +155,24 @@ std::vector<Bending> bending_of(const Run& run) {
 
 }  // namespace
 
-Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_steps) {
+double largest_rate(const Run& run, size_t body) {
+  double most = 0;
+  const size_t stride = run.motion.y.size() / 500 + 1;
+  for (size_t row = 0; row < run.motion.y.size(); row += stride)
+    most = std::max(
+        most,
+        run.tree->motion(run.motion.time[row], run.motion.y[row], Place{.body = static_cast<int>(body), .marker = {}})
+            .omega.norm());
+  return most;
+}
+
+Run run_once(const Scene& given, const RunHooks& hooks, int refine, long max_steps) {
   const Stopwatch start;
+  const Scene scene = with_joints(given);
   std::vector<PreparedBody> bodies;
   for (const BodyScene& b : scene.bodies) bodies.push_back(prepare_body(b, refine, scene.bodies_kept_in));
   const double seconds = start.seconds();
-  const auto fly = !scene.is_tree ? fly_hub : scene.formulation == "multipliers" ? fly_by_multipliers : fly_tree;
+  const auto fly = scene.formulation == "multipliers" ? fly_by_multipliers : fly_tree;
   Run r = fly(scene, std::move(bodies), hooks, max_steps);
   r.prepare_seconds += seconds;
   r.bending = bending_of(r);
@@ -356,24 +199,25 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
     if (!b.is_boom()) continue;
     const PreparedBody& p = run.bodies[i];
     const std::string model =
-        !p.kept.empty()              ? fmt::format("{} unknowns, kept in {}", p.dofs, p.kept.string())
-        : p.body.structure == "eq14" ? "eq. 14, Euler-Bernoulli line mass, closed form"
+        !p.kept.empty() && p.elements == 0 ? fmt::format("{} unknowns, kept in {}", p.dofs, p.kept.string())
+        : p.body.structure == "eq14"       ? "eq. 14, Euler-Bernoulli line mass, closed form"
         : b.structure == "solid"
             ? fmt::format("{} solid elements, {} unknowns", p.elements, p.dofs)
             : fmt::format("{} beam elements, order {}, {} unknowns", p.elements, b.geometry.order, p.dofs);
     plan.push_back(fmt::format("{}: {}; {} modes", b.name, model, p.body.n()));
     plan.push_back(fmt::format("{}: {}", b.name, damping_text(b.damping)));
   }
-  for (const HingeScene& h : scene.hinges)
-    plan.push_back(fmt::format("hinge {}: damping {:g} N m s/rad, stop {:g} N m/rad without damping of its own", h.body,
-                               h.hinge.mechanism.damping, h.hinge.mechanism.stop_stiffness));
+  for (const JointScene& j : scene.joints)
+    if (j.mechanism.stop_stiffness > 0)
+      plan.push_back(fmt::format("stop of {0}: {1:g} {2}/{3} without damping of its own; damping {4:g} {2} s/{3}",
+                                 j.name, j.mechanism.stop_stiffness, j.kind == JointKind::slider ? "N" : "N m",
+                                 j.kind == JointKind::slider ? "m" : "rad", j.mechanism.damping));
   plan.push_back(
       fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
                   run.motion.summary.method, why_method(scene, run.motion.summary), scene.tolerance));
   plan.push_back(scene.formulation == "multipliers" ? "formulation: redundant coordinates, joints by multipliers"
                                                     : "formulation: relative coordinates");
-  if (scene.is_tree) return describe_tree(scene, run, plan);
-  plan.emplace_back("geometric stiffness: left out, what that may change is error_budget.linearisation");
+  describe_model(scene, run, plan);
   if (scene.orbit)
     plan.push_back(fmt::format("orbit: rate {:.6e} rad/s{}; differential gravity {}, {:.1e} 1/s^2", scene.orbit->rate(),
                                scene.orbit->J2 ? ", with J2" : "",
@@ -390,11 +234,8 @@ void add_warnings(const Run& run, RunResult& r) {
           fmt::format("body {}: it bends by {:.3g} m at t = {:.6g} s, {:.0f} % of its length: the theory "
                       "of small deflections no longer holds",
                       run.bodies[i].body.name, b.size, b.time, 100 * b.of_length));
-  r.warnings.insert(r.warnings.end(), run.warnings.begin(), run.warnings.end());
-  if (!r.scene.is_tree && spins_fast(run)) {
-    const std::vector<std::string> more = softening_warnings(r.scene, run);
+  for (const std::vector<std::string>& more : {run.motion.warnings, softening_warnings(with_joints(r.scene), run)})
     r.warnings.insert(r.warnings.end(), more.begin(), more.end());
-  }
   if (!r.budget.measured || r.budget.within(r.scene.tolerance)) return;
   const std::string why = r.budget.missing.empty() ? fmt::format("the errors add up to {:.1e}", r.budget.total())
                                                    : fmt::format("{}", fmt::join(r.budget.missing, "; "));
@@ -402,16 +243,12 @@ void add_warnings(const Run& run, RunResult& r) {
       fmt::format("the accuracy wanted, {:.1e}, was not reached or not proven: {}", r.scene.tolerance, why));
 }
 
-}  // namespace
-
-namespace {
-
 /// What was flown and what is odd about it.
 void add_words(const Run& run, RunResult& r) {
   if (r.scene.from)
     r.plan.push_back(fmt::format("start: goes on from {} at t = {:g} s; counts and errors are those since then",
                                  r.scene.from->file().string(), r.scene.from->time()));
-  describe(r.scene, run, r.plan);
+  describe(with_joints(r.scene), run, r.plan);
   r.warnings = r.scene.warnings;
 }
 
@@ -444,7 +281,7 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks,
     of_run.checkpoint = [&](Run run, size_t first) {
       RunResult part = r;
       add_words(run, part);
-      part.warnings.insert(part.warnings.end(), run.warnings.begin(), run.warnings.end());
+      part.warnings.insert(part.warnings.end(), run.motion.warnings.begin(), run.motion.warnings.end());
       take(std::move(run), part);
       part.trajectory.summary.interrupted = false;  // not yet
       so_far(part, first);

@@ -45,9 +45,9 @@ struct EnergyOfRun {
 
 struct RunResult {
   Scene scene;
-  std::vector<PreparedBody> bodies;
-  Trajectory trajectory;
-  std::shared_ptr<const Tree> tree;  // of a scene with joints: what was flown
+  std::vector<PreparedBody> bodies;  // as with_joints has them
+  TreeTrajectory trajectory;
+  std::shared_ptr<const Tree> tree;  // of the joints that close no loop
   OutputTable outputs;
   FlightState end;                    // from which another run can go on
   std::optional<EnergyOfRun> ledger;  // of a scene with joints
@@ -58,13 +58,6 @@ struct RunResult {
   double integrate_seconds = 0;  // of the run itself, without the repeats
   double budget_seconds = 0;
 };
-
-/// The system of a scene and the state at t = 0.
-struct Flyable {
-  System system;
-  Eigen::VectorXd y0;
-};
-Flyable make_system(const Scene&, const std::vector<PreparedBody>&);
 
 struct Run;
 
@@ -94,28 +87,25 @@ struct Bending {
 
 /// One flight of a scene as it stands.
 struct Run {
-  std::vector<PreparedBody> bodies;
-  Trajectory motion;
+  std::vector<PreparedBody> bodies;  // as with_joints has them
+  TreeTrajectory motion;             // by whatever coordinates: the states are those of `tree`
   OutputTable outputs;
   FlightState end;
   std::vector<Bending> bending;  // per body
   std::optional<EnergyOfRun> ledger;
   double prepare_seconds = 0, integrate_seconds = 0;
 
-  // Of a scene with joints; the states and events of `motion` are then those of the tree, its balance is empty.
-  std::shared_ptr<const Tree> tree;
-  std::vector<LargestStiffening> stiffening_effect;  // per body
-  std::vector<std::string> notes;                    // for the plan
-  std::vector<std::string> warnings;
+  std::shared_ptr<const Tree> tree;  // of the joints that close no loop
+  std::vector<std::string> notes;    // for the plan
 };
 /// What a scene asks of an integrator; `chosen`: the method where it leaves the choice. `max_steps` as of run_once.
 IntegratorOptions integrator_options(const Scene&, const RunHooks&, std::string_view chosen, long max_steps);
 
+/// The largest angular velocity of a body's frame in a flight [rad/s].
+double largest_rate(const Run&, size_t body);
+
 /// `max_steps` > 0 bounds its cost: NumericalError above.
 Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
-
-/// Columns of trajectory.csv, of a motion that began at the flyable's start or went on from there.
-OutputTable output_table(const Scene&, const Flyable&, const Trajectory&);
 
 /// Time, numbers and modes at the end of a flight; names and stops are for the caller.
 FlightState end_of(const std::vector<PreparedBody>&, double time, const Eigen::VectorXd& y,

@@ -1,10 +1,10 @@
-// Scenes with joints: from the scene to a tree and its flight.
+// Flights in relative coordinates: from the scene to a tree, and how it flies.
 
 #include "apps/tree_flight.hpp"
 
 #include "apps/scene_keys.hpp"
 #include "apps/scene_orbit.hpp"
-#include "dynamics/multibody_of.hpp"
+#include "dynamics/hub_flight.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
 
@@ -176,6 +176,11 @@ Multibody make_multibody(const Scene& scene, const std::vector<PreparedBody>& bo
   return r;
 }
 
+Scene without_loops(Scene scene) {
+  std::erase_if(scene.joints, [](const JointScene& j) { return j.closes_loop; });
+  return scene;
+}
+
 TreeState start_state(const Scene& scene, const Tree& tree) {
   TreeState s = tree.at_rest();
   for (size_t i = 0; i < scene.joints.size(); ++i) {
@@ -191,9 +196,6 @@ TreeState start_state(const Scene& scene, const Tree& tree) {
   return s;
 }
 
-namespace {
-
-/// Where the mass centre of all bodies lies, inertial axes.
 Vector3d mass_centre(const Tree& tree, const TreeState& state) {
   const VectorXd y = tree.pack(state);
   Vector3d moment = Vector3d::Zero();
@@ -206,8 +208,6 @@ Vector3d mass_centre(const Tree& tree, const TreeState& state) {
   }
   return moment / mass;
 }
-
-}  // namespace
 
 VectorXd first_state(const Scene& scene, const Tree& tree) {
   if (scene.from) return scene.from->values(state_names(tree));
@@ -261,26 +261,15 @@ void set_corners(const Scene& scene, IntegratorOptions& o) {
 
 namespace {
 
-IntegratorOptions options_of(const Scene& scene, const RunHooks& hooks, long max_steps) {
-  IntegratorOptions o = integrator_options(scene, hooks, "auto", max_steps);
-  set_corners(scene, o);
-  return o;
-}
-
 bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty(); }
 
 EnergyOfRun ledger_of(const TreeBalance& b) { return {b.kinetic, b.potential, b.work, b.ledger}; }
 
 /// What results are made of.
 void set_flown(const Scene& scene, TreeTrajectory flight, Run& r) {
-  r.outputs = tree_output_table(scene, *r.tree, flight);
+  r.outputs = output_table(scene, *r.tree, flight);
   if (!flight.balance.empty()) r.ledger = ledger_of(flight.balance.back());
-  r.stiffening_effect = flight.stiffening_effect;
-  r.warnings = std::move(flight.warnings);
-  r.motion.time = std::move(flight.time);
-  r.motion.y = std::move(flight.y);
-  r.motion.events = std::move(flight.events);
-  r.motion.summary = std::move(flight.summary);
+  r.motion = std::move(flight);
 }
 
 }  // namespace
@@ -330,8 +319,6 @@ void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<
 Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
   const Stopwatch start;
   const Multibody multibody = make_multibody(scene, bodies);
-  IntegratorOptions options = options_of(scene, hooks, max_steps);
-  if (scene.from) options.stops = scene.from->stops(joint_names(scene));
   std::vector<Stiffening> stiffening = first_stiffening(scene, multibody);
   Run r;
   r.bodies = std::move(bodies);
@@ -359,7 +346,12 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   const auto fly = [&] {
     told = 0;
     r.tree = std::make_shared<const Tree>(multibody, stiffening);
-    flight = integrate(*r.tree, first_state(scene, *r.tree), options, checkpoint);
+    const std::optional<HubOfTree> hub = hub_of(*r.tree);
+    IntegratorOptions options = integrator_options(scene, hooks, hub ? "exponential" : "auto", max_steps);
+    set_corners(scene, options);
+    if (scene.from) options.stops = scene.from->stops(joint_names(scene));
+    const VectorXd y0 = first_state(scene, *r.tree);
+    flight = hub ? integrate(*r.tree, *hub, y0, options, checkpoint) : integrate(*r.tree, y0, options, checkpoint);
     effect = flight.stiffening_effect;
     return flight.summary.interrupted;
   };
@@ -368,24 +360,6 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   set_flown(scene, std::move(flight), r);
   r.integrate_seconds = flight_time.seconds();
   return r;
-}
-
-std::vector<LargestStiffening> stiffening_of_hub(const System& of_hub, const Trajectory& motion) {
-  const Tree tree(multibody_of(of_hub));
-  const size_t first = of_hub.fixed_hub() ? 0 : 1;  // joint that is a hinge, body that is a boom
-  std::vector<LargestStiffening> largest(tree.scene().bodies.size());
-  std::vector<char> contact(tree.scene().joints.size(), 0);
-  VectorXd y = VectorXd::Zero(tree.layout().size);
-  const Eigen::Index same = of_hub.layout().dissipated();  // up to here both have the same states
-  const size_t stride = motion.y.size() / 500 + 1;
-  for (size_t row = 0; row < motion.y.size(); row += stride) {
-    for (size_t i = first; i < contact.size(); ++i)
-      contact[i] = of_hub.gap(motion.y[row].data(), static_cast<int>(i - first)) > 0;
-    y.head(same) = motion.y[row].head(same);
-    observe(tree.stiffening_effect(motion.time[row], y, contact), motion.time[row], largest);
-  }
-  largest.erase(largest.begin(), largest.begin() + static_cast<std::ptrdiff_t>(first));
-  return largest;
 }
 
 }  // namespace flexboom

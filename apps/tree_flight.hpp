@@ -2,7 +2,6 @@
 
 #include "apps/simulate.hpp"
 #include "dynamics/tree_integrator.hpp"
-#include "fem/vtk.hpp"
 
 #include <functional>
 #include <string>
@@ -12,6 +11,9 @@ namespace flexboom {
 
 /// The bodies, joints and forces of a scene with joints. @throws InputError.
 Multibody make_multibody(const Scene&, const std::vector<PreparedBody>&);
+
+/// The joints that make the tree.
+Scene without_loops(Scene);
 
 /// Start values of its joints.
 TreeState start_state(const Scene&, const Tree&);
@@ -40,17 +42,20 @@ bool will_be_revised(const Scene&, const Multibody&, const std::vector<LargestSt
 void fly_until_settled(const Scene&, const Multibody&, std::vector<LargestStiffening>& effect, std::vector<Stiffening>&,
                        const std::function<bool()>& fly);
 
-/// One flight of a scene with joints. Geometric stiffness "auto" is on where it exceeds the tolerance at the start,
-/// under the prescribed motions, or (then the flight is repeated with it) at any output.
-/// `max_steps` > 0 bounds its cost. @throws InputError, NumericalError.
+/// One flight in relative coordinates, a hub with hinged booms by its own equations. Geometric stiffness "auto" is on
+/// where it exceeds the tolerance at the start, under the prescribed motions, or (then the flight is repeated with it)
+/// at any output. `max_steps` > 0 bounds its cost. @throws InputError, NumericalError.
 Run fly_tree(const Scene&, std::vector<PreparedBody>, const RunHooks&, long max_steps);
 
 /// Adds where the scene's functions of time are not smooth. Those of an expression are not known: no step passes an
 /// output then, so that a pulse is not stepped over.
 void set_corners(const Scene&, IntegratorOptions&);
 
+/// Where the mass centre of all bodies lies, inertial axes [m].
+Eigen::Vector3d mass_centre(const Tree&, const TreeState&);
+
 /// What a row of trajectory.csv is made of.
-struct TreeMoment {
+struct Moment {
   double time = 0;
   TreeState state;               // joints as Scene::joints
   std::vector<JointLoad> loads;  // the same
@@ -58,16 +63,10 @@ struct TreeMoment {
 };
 
 /// Columns of trajectory.csv. The rows are asked for one after the other.
-OutputTable tree_output_table(const Scene&, const Tree&, size_t rows, const std::function<TreeMoment(size_t)>& moment);
-OutputTable tree_output_table(const Scene&, const Tree&, const TreeTrajectory&);
+OutputTable output_table(const Scene&, const Tree&, size_t rows, const std::function<Moment(size_t)>& moment);
+OutputTable output_table(const Scene&, const Tree&, const TreeTrajectory&);
 
 /// What was flown, one line each.
-void describe_tree(const Scene&, const Run&, std::vector<std::string>& plan);
-
-/// Boxes of rigid bodies and deformed flexible ones at a row of the run, inertial axes.
-VtkGrid tree_picture(const RunResult&, size_t row);
-
-/// The geometric stiffness of its bodies in a flight of a hub without it.
-std::vector<LargestStiffening> stiffening_of_hub(const System& of_hub, const Trajectory&);
+void describe_model(const Scene&, const Run&, std::vector<std::string>& plan);
 
 }  // namespace flexboom

@@ -1,4 +1,4 @@
-// Outputs of a scene with joints: columns of trajectory.csv, lines of the plan.
+// Outputs of a scene: columns of trajectory.csv, lines of the plan.
 
 #include "apps/deflection.hpp"
 #include "apps/scene_orbit.hpp"
@@ -40,7 +40,8 @@ class Columns {
   Eigen::Index rows_, row_ = 0, column_ = 0;
 };
 
-void put_joint(Columns& out, const JointScene& joint, const JointState& s) {
+/// `centre`: where the scene has the mass centre, which flies along the orbit.
+void put_joint(Columns& out, const JointScene& joint, const JointState& s, const Vector3d& centre) {
   const std::string& name = joint.name;
   switch (joint.kind) {
     case JointKind::fixed:
@@ -52,12 +53,21 @@ void put_joint(Columns& out, const JointScene& joint, const JointState& s) {
     case JointKind::universal:
       out.put(name + ".angle1", s.coordinate[0]), out.put(name + ".angle2", s.coordinate[1]);
       return out.put(name + ".rate1", s.rate[0]), out.put(name + ".rate2", s.rate[1]);
-    case JointKind::free:
-      out.put(name + ".position", s.position), out.put(name + ".velocity", s.velocity);
-      [[fallthrough]];
     case JointKind::spherical:
-      out.put(name + ".rotation", rotation_vector(s.attitude)), out.put(name + ".omega", s.omega);
+    case JointKind::free:
+      out.put(name + ".rotation", rotation_vector(s.attitude)), out.put(name + ".rate", s.omega);
   }
+  if (joint.kind != JointKind::free) return;
+  Vector3d position = s.position;
+  if (joint.a.body.empty()) position += joint.a.axes().transpose() * centre;
+  out.put(name + ".position", position), out.put(name + ".velocity", s.velocity);
+}
+
+void put_body(Columns& out, const Tree& tree, size_t number, const VectorXd& q) {
+  const ReducedBody& body = tree.scene().bodies[number];
+  for (Eigen::Index k = 0; k < q.size(); ++k) out.put(fmt::format("{}.q{}", body.name, k + 1), q[k]);
+  if (const Marker* tip = body.n() > 0 ? tip_of(body) : nullptr)
+    out.put(body.name + ".tip", displacement(body, *tip, q, tree.stiffening(static_cast<int>(number))));
 }
 
 void put_load(Columns& out, const JointScene& joint, const JointLoad& load) {
@@ -65,12 +75,6 @@ void put_load(Columns& out, const JointScene& joint, const JointLoad& load) {
   if (load.drive.size() == 1) out.put(joint.name + ".drive", load.drive[0]);
   for (size_t i = 1; load.drive.size() > 1 && i <= load.drive.size(); ++i)
     out.put(fmt::format("{}.drive{}", joint.name, i), load.drive[i - 1]);
-}
-
-std::vector<char> closed_stops(const Tree& tree, const VectorXd& y) {
-  std::vector<char> contact(tree.scene().joints.size(), 0);
-  for (const int joint : tree.stops()) contact[static_cast<size_t>(joint)] = tree.gap(y.data(), joint) > 0;
-  return contact;
 }
 
 /// The joint of the body whose attitude against the LVLH frame is an output.
@@ -115,29 +119,25 @@ class Pointing {
 
 }  // namespace
 
-OutputTable tree_output_table(const Scene& scene, const Tree& tree, size_t rows,
-                              const std::function<TreeMoment(size_t)>& moment) {
+OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
+                         const std::function<Moment(size_t)>& moment) {
   OutputTable table;
   Columns out(table, static_cast<Eigen::Index>(rows));
   const Pointing pointing(scene);
+  Vector3d centre = Vector3d::Zero();
+  if (tree.scene().field) centre = mass_centre(tree, start_state(without_loops(scene), tree));
   const size_t flying = first_that_flies(scene);
   std::optional<Orbit> orbit;
   if (scene.orbit && flying < scene.joints.size()) orbit = orbit_of(scene);
   for (size_t row = 0; row < rows; ++row) {
-    const TreeMoment now = moment(row);
+    const Moment now = moment(row);
     const TreeState& s = now.state;
     out.put("t", now.time);
     for (size_t i = 0; i < scene.joints.size(); ++i) {
-      put_joint(out, scene.joints[i], s.joints[i]);
+      put_joint(out, scene.joints[i], s.joints[i], centre);
       if (scene.joints[i].loads) put_load(out, scene.joints[i], now.loads[i]);
     }
-    for (size_t b = 0; b < scene.bodies.size(); ++b) {
-      const std::string& name = scene.bodies[b].name;
-      for (Eigen::Index k = 0; k < s.q[b].size(); ++k) out.put(fmt::format("{}.q{}", name, k + 1), s.q[b][k]);
-      const ReducedBody& body = tree.scene().bodies[b];
-      if (const Marker* tip = body.n() > 0 ? tip_of(body) : nullptr)
-        out.put(name + ".tip", displacement(body, *tip, s.q[b], tree.stiffening(static_cast<int>(b))));
-    }
+    for (size_t b = 0; b < scene.bodies.size(); ++b) put_body(out, tree, b, s.q[b]);
     for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name + ".spin", s.spin[w]);
     pointing.put(out, now.time, s);
     if (orbit) {
@@ -153,22 +153,22 @@ OutputTable tree_output_table(const Scene& scene, const Tree& tree, size_t rows,
   return table;
 }
 
-OutputTable tree_output_table(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) {
+OutputTable output_table(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) {
   const bool loads = std::any_of(scene.joints.begin(), scene.joints.end(), [](const JointScene& j) { return j.loads; });
   const auto branches = [&](size_t row) {
     return motion.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(motion.laws[row]);
   };
-  return tree_output_table(scene, tree, motion.time.size(), [&](size_t row) {
+  return output_table(scene, tree, motion.time.size(), [&](size_t row) {
     const double t = motion.time[row];
     const VectorXd& y = motion.y[row];
-    return TreeMoment{t, tree.unpack(y),
-                      loads ? tree.joint_loads(t, y, closed_stops(tree, y), branches(row))
-                            : std::vector<JointLoad>(scene.joints.size()),
-                      motion.balance[row]};
+    return Moment{t, tree.unpack(y),
+                  loads ? tree.joint_loads(t, y, closed_stops(tree, y), branches(row))
+                        : std::vector<JointLoad>(scene.joints.size()),
+                  motion.balance[row]};
   });
 }
 
-void describe_tree(const Scene& scene, const Run& run, std::vector<std::string>& plan) {
+void describe_model(const Scene& scene, const Run& run, std::vector<std::string>& plan) {
   for (size_t i = 0; i < scene.bodies.size(); ++i) {
     const BodyScene& b = scene.bodies[i];
     if (b.rigid) plan.push_back(fmt::format("{}: rigid, {:g} kg", b.name, b.rigid->mass));
@@ -184,9 +184,11 @@ void describe_tree(const Scene& scene, const Run& run, std::vector<std::string>&
         known ? fmt::format(
                     "{}: geometric stiffness {} (stiffening = \"{}\"): its effect reaches {:.2g} of the stiffness of "
                     "the body",
-                    b.name, on ? "on" : "off", b.stiffening, run.stiffening_effect[i].size)
-              : fmt::format("{}: geometric stiffness unknown and left out ({}); its effect is not measured", b.name,
-                            b.reduced ? "not in the file" : "structure \"eq14\""));
+                    b.name, on ? "on" : "off", b.stiffening, run.motion.stiffening_effect[i].size)
+              : fmt::format("{}: geometric stiffness is not in the equations{}", b.name,
+                            b.reduced               ? ": it is not in the file"
+                            : b.structure == "eq14" ? ": structure \"eq14\" has none"
+                                                    : "; what it may change is error_budget.linearisation"));
   }
   for (const JointScene& j : scene.joints)
     plan.push_back(fmt::format("joint {}: {}, {} on {}{}{}", j.name, joint_type(j.kind).name, j.b.body,

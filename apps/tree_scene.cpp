@@ -64,7 +64,7 @@ std::vector<std::string> marker_names(const BodyScene& body) {
   return names;
 }
 
-std::vector<std::string> tree_outputs(const Scene& scene) {
+std::vector<std::string> outputs_of(const Scene& scene) {
   std::vector<std::string> names;
   for (const JointScene& joint : scene.joints) {
     const auto add = [&](const char* what) { names.push_back(joint.name + what); };
@@ -81,10 +81,10 @@ std::vector<std::string> tree_outputs(const Scene& scene) {
         add(".angle1"), add(".angle2"), add(".rate1"), add(".rate2");
         break;
       case JointKind::spherical:
-        add(".rotation"), add(".omega");
+        add(".rotation"), add(".rate");
         break;
       case JointKind::free:
-        add(".position"), add(".velocity"), add(".rotation"), add(".omega");
+        add(".rotation"), add(".rate"), add(".position"), add(".velocity");
     }
     if (joint.loads) add(".force"), add(".torque");
     if (joint.loads && joint.motion.size() == 1) add(".drive");

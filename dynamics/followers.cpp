@@ -24,14 +24,6 @@ Vector3d turning(const Vector3d& theta, const Vector3d& omega) {
   return 0.5 * theta.cross(omega) + c * theta.cross(theta.cross(omega));
 }
 
-Vector4d quaternion_of(const Vector3d& theta) {
-  const double half = 0.5 * theta.norm();
-  const double s = half < 1e-4 ? 0.5 * (1 - half * half / 6) : 0.5 * std::sin(half) / half;
-  Vector4d q;
-  q << std::cos(half), s * theta;
-  return q;
-}
-
 }  // namespace
 
 Followers::Followers(SplitProblem& problem, const ErrorScale& scale)

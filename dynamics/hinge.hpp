@@ -18,6 +18,8 @@ struct HingeMechanism {
   double damping = 0;                       // P2 [N m s/rad]
   double stop_stiffness = 0;                // P3 [N m/rad]; 0: no stop
   double threshold = std::numbers::pi / 2;  // Thr [rad]
+
+  bool operator==(const HingeMechanism&) const = default;
 };
 
 /// Energy [J] in spring and stop; gap: Theta - threshold [rad].

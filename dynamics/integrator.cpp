@@ -105,7 +105,7 @@ class Scales {
         each(rate + 1 + k, std::sqrt(held / body.Me(k, k)));
       }
     }
-    each(l.dissipated(), std::abs(y[l.dissipated()]));
+    for (const int spent : {l.dissipated(), l.work()}) each(spent, std::abs(y[spent]));
     if (system_.fixed_hub()) return;
     for (const int first : {l.u_begin(), l.position(), l.velocity()}) {
       const double size = y.segment<3>(first).norm();
@@ -146,7 +146,7 @@ class Scales {
         floor_[rate + 1 + m] = part * std::sqrt(2 * energy / a.body.Me(m, m));
       }
     }
-    floor_[l.dissipated()] = energy;
+    floor_.tail<2>().setConstant(energy);
     if (!system_.fixed_hub()) {
       const double J = system_.whole(y0, *work).inertia.trace() / 3, v = std::sqrt(2 * energy / system_.hub().m);
       floor_.segment<3>(l.u_begin()).setConstant(part * std::sqrt(2 * energy / J));
@@ -259,7 +259,8 @@ class SystemFlight final : public Flight<Trajectory> {
     Conservation kept(mass, inertia, options_.largest);
     for (size_t i = 0; i < result_.time.size(); ++i) {
       const Balance& b = result_.balance[i];
-      kept.add(b.kinetic + b.elastic + result_.y[i][system_.layout().dissipated()],
+      const Layout& l = system_.layout();
+      kept.add(b.kinetic + b.elastic + result_.y[i][l.dissipated()] - result_.y[i][l.work()],
                std::abs(b.kinetic) + std::abs(b.elastic), b);
     }
     s.largest = kept.largest();

@@ -16,6 +16,13 @@ inline Eigen::Vector3d rotation_vector(const Eigen::Vector4d& q) {
   return s < 1e-150 ? Eigen::Vector3d(2 * v) : Eigen::Vector3d((2 * std::atan2(s, w) / s) * v);
 }
 
+/// The quaternion (w, x, y, z) of a rotation vector [rad], exact for small angles.
+inline Eigen::Vector4d quaternion_of(const Eigen::Vector3d& theta) {
+  const double half = 0.5 * theta.norm();
+  const double s = half < 1e-4 ? 0.5 * (1 - half * half / 6) : 0.5 * std::sin(half) / half;
+  return {std::cos(half), s * theta.x(), s * theta.y(), s * theta.z()};
+}
+
 /// Rotation matrix body -> inertial of a quaternion (w, x, y, z), normalised first.
 inline Eigen::Matrix3d rotation_matrix(const Eigen::Vector4d& q) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();

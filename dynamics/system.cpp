@@ -98,7 +98,7 @@ System::System(ReducedBody hub, std::vector<Appendage> appendages, bool fixed_hu
   place_side_by_side(std::move(bodies), l.body, s.model);
   if (!fixed_hub) check_hub_inertia(s.model, l.p);
   l.u = l.base + l.p;
-  l.size = l.p + l.u + (fixed_hub ? 0 : 3 + 4 + 3) + 1;
+  l.size = l.p + l.u + (fixed_hub ? 0 : 3 + 4 + 3) + 2;
   s.hub = std::move(hub);
   s.appendages = std::move(appendages);
 }
@@ -149,7 +149,7 @@ VectorXd System::pack(const State& s) const {
     y.segment<4>(l.attitude()) = s.attitude.normalized();
     y.segment<3>(l.velocity()) = s.velocity;
   }
-  y[l.dissipated()] = s.dissipated;
+  y[l.dissipated()] = s.dissipated, y[l.work()] = s.work;
   return y;
 }
 
@@ -169,7 +169,7 @@ State System::unpack(const Eigen::Ref<const VectorXd>& y) const {
     s.attitude = y.segment<4>(l.attitude());
     s.velocity = y.segment<3>(l.velocity());
   }
-  s.dissipated = y[l.dissipated()];
+  s.dissipated = y[l.dissipated()], s.work = y[l.work()];
   return s;
 }
 
@@ -207,9 +207,9 @@ void System::derivative(double t, const double* y, std::span<const char> contact
     Eigen::Map<Vector3d>(y_dot + l.velocity()) = to_inertial(y + l.attitude(), spatial::eigen(a_hub));
   }
   y_dot[l.dissipated()] = equations::dissipated_power(impl_->model, w.scratch);
-  if (impl_->field)
-    y_dot[l.dissipated()] -=
-        equations::gravity_power(impl_->model, gravity, w.scratch, hub_velocity(l, y), {u[0], u[1], u[2]});
+  y_dot[l.work()] =
+      impl_->field ? equations::gravity_power(impl_->model, gravity, w.scratch, hub_velocity(l, y), {u[0], u[1], u[2]})
+                   : 0;
 }
 
 Vector3d System::tip_displacement(const State& s, int appendage) const {

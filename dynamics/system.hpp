@@ -32,7 +32,7 @@ struct State {
   std::vector<double> rate;                            // [rad/s]
   std::vector<Eigen::VectorXd> q;                      // per appendage
   std::vector<Eigen::VectorXd> q_dot;
-  double dissipated = 0;  // energy lost since the start; in a field of gravity less the work of gravity [J]
+  double dissipated = 0, work = 0;  // energy lost and work of a field of gravity since the start [J]
 };
 
 /// Energies [J] and momenta (inertial axes).
@@ -53,7 +53,7 @@ struct Whole {
   Eigen::Vector3d angular_momentum;  // about the mass centre [N m s]
 };
 
-/// Places of the parts of the state vector y = [p | u | R | attitude | Rdot | dissipated]:
+/// Places of the parts of the state vector y = [p | u | R | attitude | Rdot | dissipated | work]:
 /// p = (Delta_1, q_1, Delta_2, q_2, ...) with Delta = Theta - threshold, u = (omega, Delta_dot_1, q_dot_1, ...).
 /// With a fixed hub, omega, R, attitude and Rdot are absent. Delta, not Theta, is the unknown: near the stop it keeps
 /// its digits.
@@ -68,7 +68,8 @@ struct Layout {
   int position() const { return p + u; }
   int attitude() const { return p + u + base; }
   int velocity() const { return p + u + base + (base ? 4 : 0); }
-  int dissipated() const { return size - 1; }
+  int dissipated() const { return size - 2; }
+  int work() const { return size - 1; }
 };
 
 /// Scratch of one thread; made by System::workspace().

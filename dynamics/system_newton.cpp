@@ -202,7 +202,7 @@ void System::solve_newton(const double* b, Workspace& w, double* x) const {
     Eigen::Map<Vector3d>(x + l.position()) = dr;
   }
   Eigen::Map<VectorXd>(x, l.p + l.u) = w.delta;
-  x[l.dissipated()] = dissipated;
+  x[l.dissipated()] = dissipated, x[l.work()] = b[l.work()];
 }
 
 MatrixXd System::dense_jacobian(const Workspace& w) const {

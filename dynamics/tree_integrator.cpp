@@ -299,6 +299,31 @@ std::vector<std::string> stiffening_warnings(const Multibody& scene, const std::
 
 namespace {
 
+std::span<const LawBranch> laws_at(const TreeTrajectory& flight, size_t row) {
+  return flight.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(flight.laws[row]);
+}
+
+}  // namespace
+
+std::vector<LargestStiffening> largest_stiffening(const Tree& tree, const TreeTrajectory& flight) {
+  std::vector<LargestStiffening> largest(tree.scene().bodies.size());
+  const size_t stride = flight.y.size() / 500 + 1;
+  for (size_t row = 0; row < flight.y.size(); row += stride) {
+    const VectorXd& y = flight.y[row];
+    observe(tree.stiffening_effect(flight.time[row], y, closed_stops(tree, y), laws_at(flight, row)), flight.time[row],
+            largest);
+  }
+  return largest;
+}
+
+std::vector<char> closed_stops(const Tree& tree, const Eigen::Ref<const VectorXd>& y) {
+  std::vector<char> closed(tree.scene().joints.size(), 0);
+  for (const int joint : tree.stops()) closed[static_cast<size_t>(joint)] = tree.gap(y.data(), joint) > 0;
+  return closed;
+}
+
+namespace {
+
 struct MethodChoice {
   std::string name, why;
 };

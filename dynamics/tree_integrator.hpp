@@ -21,6 +21,9 @@ void observe(const std::vector<StiffeningEffect>&, double t, std::vector<Largest
 std::vector<std::string> stiffening_warnings(const Multibody&, const std::vector<LargestStiffening>&, double tolerance,
                                              const std::function<Stiffening(int body)>&);
 
+/// Per joint: is its stop closed where gaps alone say so?
+std::vector<char> closed_stops(const Tree&, const Eigen::Ref<const Eigen::VectorXd>& y);
+
 struct TreeTrajectory {
   std::vector<double> time;
   std::vector<Eigen::VectorXd> y;  // Tree::layout(), prescribed coordinates as prescribed
@@ -31,6 +34,9 @@ struct TreeTrajectory {
   std::vector<LargestStiffening> stiffening_effect;  // per body, at the outputs
   std::vector<std::string> warnings;
 };
+
+/// At the rows of a flight, of long ones at some.
+std::vector<LargestStiffening> largest_stiffening(const Tree&, const TreeTrajectory&);
 
 /// Flies the tree from y0. Method "auto": the one that suits its start, and bdf where that fails.
 /// `rescale_at_events` is not heard: errors are measured against the largest motion so far.

@@ -5,7 +5,7 @@
 #include "dynamics/rotation.hpp"
 #include "dynamics/workspace.hpp"
 
-#include "apps/simulate.hpp"
+#include "tests/bench_hub.hpp"
 
 #include <benchmark/benchmark.h>
 #include <Eigen/Cholesky>
@@ -20,27 +20,6 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-Scene sport_scene(int modes) {
-  Scene scene = load_scene("sport");
-  for (BodyScene& b : scene.bodies) b.structure = "eq14", b.modes = modes;
-  return scene;
-}
-
-Flyable sport(int modes) {
-  const Scene scene = sport_scene(modes);
-  std::vector<PreparedBody> bodies;
-  for (const BodyScene& b : scene.bodies) bodies.push_back(prepare_body(b));
-  return make_system(scene, bodies);
-}
-
-/// A state in the middle of the motion.
-VectorXd moving_state(const Flyable& f) {
-  IntegratorOptions o;
-  o.tolerance = 1e-6;
-  o.duration = 0.12;
-  return integrate(f.system, f.y0, o).y.back();
-}
 
 /// The same accelerations the plain way: the mass matrices of eq. 7 as in dynamics/README.md, one dense
 /// projection, one dense solve.
@@ -108,7 +87,7 @@ VectorXd plain_accelerations(const System& system, const VectorXd& y, const std:
 }
 
 void RightHandSide(benchmark::State& state) {
-  const Flyable f = sport(static_cast<int>(state.range(0)));
+  const HubInFlight f = sport(static_cast<int>(state.range(0)));
   const VectorXd y = moving_state(f);
   VectorXd y_dot(y.size());
   const std::vector<char> contact(4, 0);
@@ -124,7 +103,7 @@ void RightHandSide(benchmark::State& state) {
 BENCHMARK(RightHandSide)->Arg(1)->Arg(2)->Arg(4)->Arg(8);
 
 void RightHandSidePlain(benchmark::State& state) {
-  const Flyable f = sport(static_cast<int>(state.range(0)));
+  const HubInFlight f = sport(static_cast<int>(state.range(0)));
   const VectorXd y = moving_state(f);
   const std::vector<char> contact(4, 0);
   for (auto _ : state) benchmark::DoNotOptimize(plain_accelerations(f.system, y, contact).data());
@@ -132,7 +111,7 @@ void RightHandSidePlain(benchmark::State& state) {
 BENCHMARK(RightHandSidePlain)->Arg(2);
 
 void Jacobian(benchmark::State& state) {
-  const Flyable f = sport(2);
+  const HubInFlight f = sport(2);
   const VectorXd y = moving_state(f);
   const std::vector<char> contact(4, 0);
   const auto work = f.system.workspace();
@@ -141,7 +120,7 @@ void Jacobian(benchmark::State& state) {
 BENCHMARK(Jacobian);
 
 void JacobianByDifferences(benchmark::State& state) {
-  const Flyable f = sport(2);
+  const HubInFlight f = sport(2);
   VectorXd y = moving_state(f), y_dot(y.size());
   const std::vector<char> contact(4, 0);
   const auto work = f.system.workspace();
@@ -151,7 +130,7 @@ void JacobianByDifferences(benchmark::State& state) {
 BENCHMARK(JacobianByDifferences);
 
 void NewtonFactoriseAndSolve(benchmark::State& state) {
-  const Flyable f = sport(2);
+  const HubInFlight f = sport(2);
   const VectorXd y = moving_state(f);
   VectorXd b = VectorXd::Ones(y.size());
   const std::vector<char> contact(4, 0);
@@ -167,7 +146,7 @@ BENCHMARK(NewtonFactoriseAndSolve);
 
 /// The same with a dense matrix of all unknowns, as CVODE's own dense solver would.
 void NewtonDense(benchmark::State& state) {
-  const Flyable f = sport(2);
+  const HubInFlight f = sport(2);
   const VectorXd y = moving_state(f);
   VectorXd b = VectorXd::Ones(y.size());
   const std::vector<char> contact(4, 0);
@@ -186,26 +165,24 @@ double error_of(const OutputTable& run, const OutputTable& reference, const std:
 
 const OutputTable& converged() {
   static const OutputTable table = [] {
-    const Scene scene = sport_scene(2);
-    const Flyable f = sport(2);
+    const HubInFlight f = sport(2);
     IntegratorOptions o;
     o.method = "bdf";
     o.tolerance = 1e-11;
-    return output_table(scene, f, integrate(f.system, f.y0, o));
+    return f.outputs(o);
   }();
   return table;
 }
 
 /// 10 s of SPORT; the argument is -log10 of the tolerance.
 void TenSeconds(benchmark::State& state, const char* method) {
-  const Scene scene = sport_scene(2);
-  const Flyable f = sport(2);
+  const HubInFlight f = sport(2);
   IntegratorOptions o;
   o.method = method;
   o.tolerance = std::pow(10.0, -static_cast<double>(state.range(0)));
   Trajectory r;
   for (auto _ : state) r = integrate(f.system, f.y0, o);
-  const OutputTable table = output_table(scene, f, r);
+  const OutputTable table = f.outputs(o);
   state.counters["hub.rotation"] = error_of(table, converged(), "hub.rotation");
   state.counters["slp.q"] = error_of(table, converged(), "slp.q");
   state.counters["largest"] = largest(compare_outputs(table, converged(), {}));
@@ -223,15 +200,14 @@ BENCHMARK_CAPTURE(TenSeconds, dirk, "dirk")->DenseRange(3, 9, 2)->Unit(benchmark
 /// The same with more modes (the fastest eigenvalue grows from 5e4 to 2e7 1/s), for so many seconds: the contacts are
 /// in the first ten.
 void MoreModes(benchmark::State& state) {
-  const Flyable f = sport(static_cast<int>(state.range(0)));
+  const HubInFlight f = sport(static_cast<int>(state.range(0)));
   IntegratorOptions o;
   o.duration = static_cast<double>(state.range(1));
   Trajectory r;
   for (auto _ : state) r = integrate(f.system, f.y0, o);
-  const Scene scene = sport_scene(static_cast<int>(state.range(0)));
+  const OutputTable table = f.outputs(o);
   o.tolerance = 1e-9;
-  const OutputTable reference = output_table(scene, f, integrate(f.system, f.y0, o));
-  state.counters["largest"] = largest(compare_outputs(output_table(scene, f, r), reference, {}));
+  state.counters["largest"] = largest(compare_outputs(table, f.outputs(o), {}));
   state.counters["coordinates"] = 6 + f.system.layout().p;
   state.counters["steps"] = static_cast<double>(r.summary.steps);
   state.counters["evaluations"] = static_cast<double>(r.summary.rhs_evaluations);

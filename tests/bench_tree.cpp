@@ -3,8 +3,8 @@
 #include "dynamics/multibody_of.hpp"
 #include "dynamics/tree_integrator.hpp"
 
-#include "apps/simulate.hpp"
 #include "reduction/eq14.hpp"
+#include "tests/bench_hub.hpp"
 
 #include <benchmark/benchmark.h>
 
@@ -16,24 +16,8 @@ using namespace flexboom;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-Flyable sport(int modes) {
-  Scene scene = load_scene("sport");
-  for (BodyScene& b : scene.bodies) b.structure = "eq14", b.modes = modes;
-  std::vector<PreparedBody> bodies;
-  for (const BodyScene& b : scene.bodies) bodies.push_back(prepare_body(b));
-  return make_system(scene, bodies);
-}
-
-/// A state in the middle of the motion.
-VectorXd moving_state(const Flyable& f) {
-  IntegratorOptions o;
-  o.tolerance = 1e-6;
-  o.duration = 0.12;
-  return integrate(f.system, f.y0, o).y.back();
-}
-
 void SportBySystem(benchmark::State& state) {
-  const Flyable f = sport(static_cast<int>(state.range(0)));
+  const HubInFlight f = sport(static_cast<int>(state.range(0)));
   const VectorXd y = moving_state(f);
   VectorXd y_dot(y.size());
   const std::vector<char> contact(4, 0);
@@ -43,11 +27,11 @@ void SportBySystem(benchmark::State& state) {
 BENCHMARK(SportBySystem)->Arg(2)->Arg(8);
 
 void SportByTree(benchmark::State& state) {
-  const Flyable f = sport(static_cast<int>(state.range(0)));
+  const HubInFlight f = sport(static_cast<int>(state.range(0)));
   const Tree tree(multibody_of(f.system));
   const VectorXd of_system = moving_state(f);
   VectorXd y = VectorXd::Zero(tree.layout().size), y_dot(y.size()), expected(of_system.size());
-  const Eigen::Index n = of_system.size() - 1;  // all but the energies
+  const Eigen::Index n = of_system.size() - 2;  // all but the energies
   y.head(n) = of_system.head(n);
   const std::vector<char> contact(5, 0);
   const auto work = tree.workspace();
@@ -95,11 +79,11 @@ void ChainByModes(benchmark::State& state) { run(state, chain(4, static_cast<int
 BENCHMARK(ChainByModes)->RangeMultiplier(2)->Range(2, 64)->Complexity();
 
 void JacobianOfSport(benchmark::State& state) {
-  const Flyable f = sport(2);
+  const HubInFlight f = sport(2);
   const Tree tree(multibody_of(f.system));
   VectorXd y = VectorXd::Zero(tree.layout().size);
   const VectorXd of_system = moving_state(f);
-  y.head(of_system.size() - 1) = of_system.head(of_system.size() - 1);
+  y.head(of_system.size() - 2) = of_system.head(of_system.size() - 2);
   Eigen::MatrixXd J;
   const auto work = tree.workspace();
   const std::vector<char> contact(5, 0);

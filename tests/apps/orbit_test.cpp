@@ -28,14 +28,7 @@ hub = { mass = 8.5, inertia = [[0.10, 0, 0.005], [0, 0.14, 0], [0.005, 0, 0.06]]
   return scene;
 }
 
-OutputTable fly(const Scene& scene) {
-  const Flyable flyable = make_system(scene, {});
-  IntegratorOptions options;
-  options.tolerance = scene.tolerance;
-  options.duration = scene.duration;
-  options.output_step = scene.output_step;
-  return output_table(scene, flyable, integrate(flyable.system, flyable.y0, options));
-}
+OutputTable fly(const Scene& scene) { return run_once(scene, {}).outputs; }
 
 double largest(const OutputTable& table, const std::string& name) {
   const auto column = std::ranges::find(table.names, name) - table.names.begin();

@@ -341,7 +341,7 @@ class Changed(Case):
             result = flexboom("run", "sport", "--duration", "0.3", "--continue", out, "--out", self.folder / "later",
                               "--force")
             self.assert_exit(INPUT, result)
-            self.assertIn(f'is "flexboom-state-{version}"; this version reads "flexboom-state-2"', result.stderr)
+            self.assertIn(f'is "flexboom-state-{version}"; this version reads "flexboom-state-3"', result.stderr)
 
 
 class SlowKilled(Kills):

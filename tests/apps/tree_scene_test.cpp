@@ -58,7 +58,7 @@ TEST(TreeScene, Flies) {
   };
   for (const char* name :
        {"lift.length", "lift.rate", "lift.force.x", "shoulder.angle", "wrist.angle2", "string.rotation.x",
-        "string.omega.z", "arm.q2", "arm.tip.y", "wheel.spin", "energy.work", "energy.potential"})
+        "string.rate.z", "arm.q2", "arm.tip.y", "wheel.spin", "energy.work", "energy.potential"})
     EXPECT_TRUE(has(name)) << name;
   EXPECT_FALSE(has("lift.drive"));  // it is given
 }

@@ -1,10 +1,13 @@
 // Every feature of a scene with every other, by relative coordinates and by multipliers: one motion.
 
+#include "apps/report.hpp"
+#include "apps/results_folder.hpp"
 #include "reduction/body_file.hpp"
 #include "tests/apps/run_testing.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -178,6 +181,106 @@ double apart(const RunResult& a, const RunResult& b, std::string& worst) {
     if (error > most) most = error, worst = name;
   }
   return most;
+}
+
+/// Force and torque on the boom by Newton and Euler for the hub, which nothing else touches: by central differences of
+/// its velocity and rate, axes of the boom. Error and size of both.
+void expect_balance_of_the_hub(const RunResult& r, const std::string& name) {
+  const Eigen::Matrix3d J{{0.10, 0.001, 0}, {0.001, 0.14, 0}, {0, 0, 0.06}};
+  const Eigen::Vector3d point(0.1, 0.05, 0.15);
+  const double mass = 8.5, h = column(r, "t")[1] - column(r, "t")[0];
+  double force_error = 0, force_size = 0, torque_error = 0, torque_size = 0;
+  for (Eigen::Index i = 2; i + 2 < r.outputs.values.rows(); ++i) {
+    const auto slope = [&](const char* of) -> Eigen::Vector3d {
+      return (8 * (vector_at(r, of, i + 1) - vector_at(r, of, i - 1)) - vector_at(r, of, i + 2) +
+              vector_at(r, of, i - 2)) /
+             (12 * h);
+    };
+    const Eigen::Vector3d turned = vector_at(r, "hub.rotation", i), omega = vector_at(r, "hub.rate", i);
+    const Eigen::Matrix3d A =
+        Eigen::AngleAxisd(turned.norm(), turned.norm() > 0 ? turned.normalized() : Eigen::Vector3d::UnitX())
+            .toRotationMatrix();
+    Eigen::Matrix3d C;  // boom at angle zero -> hub: stowed, outward, their product
+    C << 0, 1, 0, 0, 0, -1, -1, 0, 0;
+    C *= Eigen::AngleAxisd(column(r, "boom.angle")[i], Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    const Eigen::Vector3d force = C * vector_at(r, "boom.force", i), torque = C * vector_at(r, "boom.torque", i);
+    const Eigen::Vector3d on_hub = mass * A.transpose() * slope("hub.velocity");
+    const Eigen::Vector3d moment = J * slope("hub.rate") + omega.cross(J * omega);
+    force_error = std::max(force_error, (force + on_hub).norm());
+    torque_error = std::max(torque_error, (torque + point.cross(force) + moment).norm());
+    force_size = std::max(force_size, force.norm()), torque_size = std::max(torque_size, moment.norm());
+  }
+  // The modes of the boom on its hinge, up to 2500 rad/s, over steps of 2e-5 s: (omega h)^4 / 30 of what they do.
+  EXPECT_LT(force_error, 1e-5 * force_size) << name;
+  EXPECT_LT(torque_error, 1e-5 * torque_size) << name;
+  EXPECT_GT(force_size, 1e-2) << name;
+}
+
+TEST(Combinations, LoadsOfAHingeBalanceTheHubInBothFormulations) {
+  Scene scene = parse_scene(hub_with_a_boom, "loads");
+  scene.hinges[0].loads = true;
+  scene.duration = 0.02, scene.output_step = 2e-5, scene.tolerance = 1e-11;
+  for (const char* formulation : {"relative", "multipliers"}) {
+    scene.formulation = formulation;
+    expect_balance_of_the_hub(run_scene(scene, {}), formulation);
+  }
+}
+
+/// Report, budget, going on and the methods, of one scene in one formulation.
+void expect_whole(Scene scene, const std::string& name, const std::filesystem::path& folder) {
+  scene.duration = 0.04, scene.output_step = 0.01, scene.vtu_step = 0.02;
+  const RunResult whole = run_scene(scene, {});
+  {
+    ResultsFolder results(folder / "results", scene, "");
+    results.write(whole);
+    const std::string page = report_html(folder / "results");
+    EXPECT_NE(page.find("<canvas"), std::string::npos) << name << ": " << page.substr(0, 3000);
+    EXPECT_TRUE(std::filesystem::exists(folder / "results" / "motion_00002.vtu")) << name;
+  }
+  std::string worst;
+  Scene half = scene;
+  half.duration = 0.02;
+  const RunResult on = run_scene(going_on(scene, run_scene(half, {})), {});
+  EXPECT_EQ(on.outputs.names, whole.outputs.names) << name;
+  const Eigen::Index last = whole.outputs.values.rows() - 1;
+  OutputTable end_of_whole{whole.outputs.names, whole.outputs.values.row(last)},
+      end_of_both{on.outputs.names, on.outputs.values.bottomRows(1)};
+  EXPECT_LT(largest(compare_outputs(end_of_both, end_of_whole, {})), 1e-5) << name;
+  Scene measured = scene;
+  measured.tolerance = 1e-5, measured.error_budget = true;
+  const RunResult r = run_scene(measured, {});
+  EXPECT_TRUE(r.budget.measured) << name;
+  EXPECT_TRUE(r.budget.time < 1e-4) << name << ": " << r.budget.time;
+  EXPECT_EQ(std::isnan(r.budget.total()), !r.budget.missing.empty()) << name;
+  if (scene.formulation == "multipliers") return;  // by one method
+  for (const IntegratorMethod& m : integrator_methods()) {
+    if (scene.is_tree && m.make == nullptr) continue;
+    scene.integrator = m.name;
+    const double error = apart(run_scene(scene, {}), whole, worst);
+    EXPECT_LT(error, 1e-5) << name << " by " << m.name << ": " << worst;
+  }
+}
+
+TEST(SlowCombinations, EveryFeatureHasReportBudgetContinuationAndAllMethods) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("flexboom_outputs_" + std::to_string(::getpid()));
+  const std::filesystem::path body_file = folder / "boom.h5";
+  std::filesystem::create_directories(folder);
+  BodyScene boom = scene_named("sport").bodies[0];
+  boom.stiffening = "on";
+  write_body_file(body_file, prepare_body(boom).body);
+  for (const Feature& f : features(body_file))
+    for (const char* formulation : {"relative", "multipliers"}) {
+      const std::string name = std::string(f.name) + ", " + formulation;
+      try {
+        Scene scene = parse_scene(text_of({&f}), "combination");
+        scene.bodies_kept_in = folder, scene.formulation = formulation;
+        expect_whole(scene, name, folder);
+      } catch (const std::exception& error) {
+        ADD_FAILURE() << name << ": " << error.what();
+      }
+    }
+  std::filesystem::remove_all(folder);
 }
 
 TEST(SlowCombinations, EveryPairOfFeaturesFliesAlikeInBothFormulations) {

@@ -190,7 +190,7 @@ TEST(TreeScenes, TumblingIsJacobis) {
   double rate = 0, attitude = 0;
   for (Index i = 0; i < r.outputs.values.rows(); ++i) {
     const std::vector<double>& row = rows[static_cast<size_t>(i)];
-    rate = std::max(rate, (vector_at(r, "hub.omega", i) - Vector3d(row[1], row[2], row[3])).norm());
+    rate = std::max(rate, (vector_at(r, "hub.rate", i) - Vector3d(row[1], row[2], row[3])).norm());
     const Vector4d exact(row[4], row[5], row[6], row[7]);
     const Vector3d turn = vector_at(r, "hub.rotation", i);
     const double angle = turn.norm();
