@@ -51,8 +51,7 @@ constexpr const char* by_multipliers = "ida";
 std::vector<std::string> methods_of(const Scene& scene) {
   std::vector<std::string> names = {by_multipliers};
   if (std::ranges::any_of(scene.joints, &JointScene::closes_loop)) return names;
-  for (const IntegratorMethod& m : std::views::reverse(integrator_methods()))
-    names.emplace(names.begin(), m.name);
+  for (const IntegratorMethod& m : std::views::reverse(integrator_methods())) names.emplace(names.begin(), m.name);
   return names;
 }
 
