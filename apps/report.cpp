@@ -179,15 +179,6 @@ fs::path kept_in(const json& summary) {
   return {};
 }
 
-/// A page without a picture is better than none.
-std::string picture_html(const Folder& f) {
-  try {
-    return animation_html(f.scene, f.table, kept_in(f.summary));
-  } catch (const std::runtime_error& e) {
-    return fmt::format("<p>There is no moving picture: {}</p>\n", escaped(e.what()));
-  }
-}
-
 /// @throws json::exception when the summary lacks something.
 std::string page(const Folder& f) {
   const json& s = f.summary;
@@ -199,7 +190,7 @@ std::string page(const Folder& f) {
   h += fmt::format("<p>{} s simulated in {} s ({} times real time), {} steps, {} contacts and releases.</p>\n",
                    cell(s.at("simulated_seconds")), cell(s.at("seconds").at("integrate")),
                    cell(s.at("real_time_factor")), cell(s.at("steps")), cell(s.at("events")));
-  h += picture_html(f);
+  h += animation_html(f.scene, f.table, kept_in(s));
   for (const Plot& p : plots(f)) h += svg(p);
   h += "<h2>How wrong is it?</h2>\n<table>" + rows(s.at("error_budget")) +
        fmt::format("<tr><th>energy balance</th><td>{}</td></tr><tr><th>momentum drift</th><td>{}</td></tr></table>\n",

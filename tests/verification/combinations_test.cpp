@@ -254,7 +254,6 @@ void expect_whole(Scene scene, const std::string& name, const std::filesystem::p
   EXPECT_EQ(std::isnan(r.budget.total()), !r.budget.missing.empty()) << name;
   if (scene.formulation == "multipliers") return;  // by one method
   for (const IntegratorMethod& m : integrator_methods()) {
-    if (scene.is_tree && m.make == nullptr) continue;
     scene.integrator = m.name;
     const double error = apart(run_scene(scene, {}), whole, worst);
     EXPECT_LT(error, 1e-5) << name << " by " << m.name << ": " << worst;

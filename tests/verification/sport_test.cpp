@@ -54,7 +54,8 @@ TEST(PaperFigures, ElasticCoordinatePeaksAtEachStopContact) {
     int contacts = 0;
     for (size_t i = 0; i + 1 < r.trajectory.events.size(); ++i) {
       const StopEvent& e = r.trajectory.events[i];
-      if (r.bodies[static_cast<size_t>(e.joint)].body.name != boom || !e.contact || std::abs(e.rate) < 0.02) continue;
+      if (r.tree->scene().joints[static_cast<size_t>(e.joint)].name != boom || !e.contact || std::abs(e.rate) < 0.02)
+        continue;
       const auto release =
           std::find_if(r.trajectory.events.begin() + static_cast<std::ptrdiff_t>(i) + 1, r.trajectory.events.end(),
                        [&](const StopEvent& f) { return f.joint == e.joint; });
@@ -155,7 +156,7 @@ TEST(Sport, BeamsWithoutShearAndRotaryInertiaFlyLikeEq14) {
 TEST(Sport, EveryBodyReportsItsInvariantChecks) {
   const RunResult& r = first_second();
   for (const PreparedBody& p : r.bodies) {
-    EXPECT_GT(p.checks.size(), 10U);
+    EXPECT_TRUE(p.body.n() == 0 || p.checks.size() > 10) << p.body.name;
     for (const BodyCheck& c : p.checks) EXPECT_LT(c.relative_error, 1e-12) << p.body.name << "." << c.name;
   }
 }
