@@ -265,10 +265,10 @@ bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty
 
 EnergyOfRun ledger_of(const TreeBalance& b) { return {b.kinetic, b.potential, b.work, b.ledger}; }
 
-/// What results are made of.
-void set_flown(const Scene& scene, TreeTrajectory flight, Run& r) {
+/// What results are made of; by_source: are energies known by their sources?
+void set_flown(const Scene& scene, TreeTrajectory flight, bool by_source, Run& r) {
   r.outputs = output_table(scene, *r.tree, flight);
-  if (!flight.balance.empty()) r.ledger = ledger_of(flight.balance.back());
+  if (by_source && !flight.balance.empty()) r.ledger = ledger_of(flight.balance.back());
   r.motion = std::move(flight);
 }
 
@@ -326,6 +326,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   const Stopwatch flight_time;
   size_t told = 0;
   std::vector<LargestStiffening> effect;  // of the flight so far
+  bool by_source = true;
   Checkpoint<TreeTrajectory> checkpoint;
   if (hooks.checkpoint)
     checkpoint = [&](const TreeTrajectory& so_far, size_t outputs) {
@@ -337,7 +338,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
         rows.laws.assign(so_far.laws.begin() + static_cast<std::ptrdiff_t>(told),
                          so_far.laws.begin() + static_cast<std::ptrdiff_t>(outputs));
       rows.stiffening_effect = so_far.stiffening_effect, rows.warnings = so_far.warnings;
-      set_flown(scene, std::move(rows), part);
+      set_flown(scene, std::move(rows), by_source, part);
       part.end = end_of(part, scene, so_far.time.back(), so_far.y.back(), so_far.summary);
       part.integrate_seconds = flight_time.seconds();
       hooks.checkpoint(std::move(part), std::exchange(told, outputs));
@@ -347,6 +348,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
     told = 0;
     r.tree = std::make_shared<const Tree>(multibody, stiffening);
     const std::optional<HubOfTree> hub = hub_of(*r.tree);
+    by_source = !hub;
     IntegratorOptions options = integrator_options(scene, hooks, hub ? "exponential" : "auto", max_steps);
     set_corners(scene, options);
     if (scene.from) options.stops = scene.from->stops(joint_names(scene));
@@ -357,7 +359,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   };
   fly_until_settled(scene, multibody, effect, stiffening, fly);
   r.end = end_of(r, scene, flight.time.back(), flight.y.back(), flight.summary);
-  set_flown(scene, std::move(flight), r);
+  set_flown(scene, std::move(flight), by_source, r);
   r.integrate_seconds = flight_time.seconds();
   return r;
 }

