@@ -107,11 +107,9 @@ TEST(TreeScenes, SportFliesAsTheSceneOfItsHub) {
 /// hundredth of the fastest: what a method leaves open of a gap moves a slow contact in proportion to 1 / rate.
 void expect_same_contacts(const RunResult& a, const RunResult& b, const std::string& what) {
   const auto names = [](const RunResult& r) {
-    std::vector<std::string> of_joints;
-    if (r.scene.is_tree)
-      of_joints = joint_names(r.scene);
-    else
-      for (const PreparedBody& p : r.bodies) of_joints.push_back(p.body.name);
+    if (r.scene.is_tree) return joint_names(r.scene);
+    std::vector<std::string> of_joints = {"hub"};
+    for (const HingeScene& h : r.scene.hinges) of_joints.push_back(h.body);
     return of_joints;
   };
   const std::vector<std::string> of_a = names(a), of_b = names(b);
