@@ -231,20 +231,20 @@ TEST(OrbitalFlight, DistanceOfThePlanetCostsNoDigits) {
 }
 
 /// An orbit of two minutes, eccentric and about an oblate planet, so that gravity shows beside impacts of the booms.
-TEST(OrbitalFlight, TreesAndMultipliersFlyAsTheHub) {
+/// The three agree to the given error when each is integrated to the given tolerance. Returns the number of impacts.
+size_t expect_trees_and_multipliers_to_fly_as_the_hub(double duration, double tolerance, double agreement) {
   const double far = 7e6;
   const OrbitalElements elements = {.semi_major_axis = far, .eccentricity = 0.1, .inclination = 0.9, .periapsis = 0.4};
   const Planet planet = {.mu = 0.05 * 0.05 * far * far * far, .radius = 6e6, .J2 = earth_J2};
-  const double duration = 3;
+  const double output_step = duration / 30;
   const std::vector<double> angles(4, pi / 2 - 0.05);
   const System system = sport(OrbitalField{Orbit(elements, planet, duration)});
   const VectorXd y0 = system.pack(turning_with_orbit(system, angles, {0.1, -0.2, 0.3}));
-  const Trajectory hub = integrate(system, y0, options("exponential", 1e-11, duration, 0.1));
+  const Trajectory hub = integrate(system, y0, options("exponential", tolerance, duration, output_step));
   const Trajectory without = [&] {
     const System alone = sport({});
-    return integrate(alone, y0, options("exponential", 1e-11, duration, 0.1));
+    return integrate(alone, y0, options("exponential", tolerance, duration, output_step));
   }();
-  ASSERT_GT(hub.events.size(), 5u);
 
   const Index motion = system.layout().dissipated();
   const auto apart = [&](size_t i, const VectorXd& y) {
@@ -252,30 +252,39 @@ TEST(OrbitalFlight, TreesAndMultipliersFlyAsTheHub) {
   };
   double of_field = 0;
   for (size_t i = 0; i < hub.y.size(); ++i) of_field = std::max(of_field, apart(i, without.y[i]));
-  EXPECT_GT(of_field, 1e-4);
+  EXPECT_GT(of_field, 10 * agreement);
 
   const Tree tree(multibody_of(system));
   VectorXd start = VectorXd::Zero(tree.layout().size);
   start.head(motion) = y0.head(motion);
-  const TreeTrajectory of_tree = integrate(tree, start, options("adams", 1e-11, duration, 0.1));
+  const TreeTrajectory of_tree = integrate(tree, start, options("adams", tolerance, duration, output_step));
   double error = 0;
   for (size_t i = 0; i < hub.y.size(); ++i) error = std::max(error, apart(i, of_tree.y[i]));
-  EXPECT_LT(error, 1e-8);
-  EXPECT_LT(of_tree.summary.energy_balance, 1e-9);
+  EXPECT_LT(error, agreement);
+  EXPECT_LT(of_tree.summary.energy_balance, agreement / 10);
 
   const Multipliers multipliers(multibody_of(system));
-  MultipliersOptions o{options("ida", 1e-11, duration, 0.1)};
+  MultipliersOptions o{options("ida", tolerance, duration, output_step)};
   o.angles.assign(5, angles[0]);
   const MultibodyTrajectory by_multipliers = integrate_multipliers(multipliers, body_states(tree, 0, start), o);
   double error_by_multipliers = 0;
   for (size_t i = 0; i < hub.y.size(); ++i)
     error_by_multipliers =
         std::max(error_by_multipliers, apart(i, tree.pack(tree_state(multipliers, by_multipliers.states[i]))));
-  EXPECT_LT(error_by_multipliers, 1e-8);
-  EXPECT_LT(by_multipliers.summary.energy_balance, 1e-9);
+  EXPECT_LT(error_by_multipliers, agreement);
+  EXPECT_LT(by_multipliers.summary.energy_balance, agreement / 10);
   std::printf("in orbit: %.1e of the hub's motion by gravity; tree %.1e, energy %.1e; multipliers %.1e, energy %.1e\n",
               of_field, error, of_tree.summary.energy_balance, error_by_multipliers,
               by_multipliers.summary.energy_balance);
+  return hub.events.size();
+}
+
+TEST(OrbitalFlight, TreesAndMultipliersFlyAsTheHub) {
+  EXPECT_GT(expect_trees_and_multipliers_to_fly_as_the_hub(1, 1e-10, 1e-8), 5u);
+}
+
+TEST(OrbitalFlight, TreesAndMultipliersFlyAsTheHubForAMoment) {
+  expect_trees_and_multipliers_to_fly_as_the_hub(0.3, 1e-8, 1e-6);
 }
 
 }  // namespace
