@@ -3,6 +3,7 @@
 #include "apps/scene_keys.hpp"
 #include "fem/check.hpp"
 #include "fem/constraints.hpp"
+#include "reduction/basis.hpp"
 #include "reduction/eigen_solver.hpp"
 
 #include <fmt/format.h>
@@ -215,19 +216,86 @@ void check_model(Faults& faults, const std::string& path, const BodyScene& body)
       section_of(segment.start, segment.material.nu, rule);
       section_of(segment.end, segment.material.nu, rule);
     }
-    if (body.structure == "beam" && !body.modes_auto) check_mode_count(faults, path, body);
+    if (body.structure == "beam" && body.basis.name == "clamped" && !body.modes_auto)
+      check_mode_count(faults, path, body);
     if (body.structure == "solid") chosen(body.geometry, body.solid);
   } catch (const InputError& error) {
     faults.add(join(path, "segments"), error.what());
   }
 }
 
-void check_clamp(Faults& faults, const std::string& path, const BodyScene& body) {
+/// Node sets of a boom.
+std::vector<std::string_view> sets_of(const BodyScene& body) {
   std::vector<std::string_view> sets = {"root", "tip"};
   for (const RigidAttachment& attachment : body.geometry.attachments) {
     if (!attachment.name.empty()) sets.push_back(attachment.name);
   }
-  check_name_among(faults, join(path, "clamp"), body.clamp, sets);
+  return sets;
+}
+
+void check_clamp(Faults& faults, const std::string& path, const BodyScene& body) {
+  check_name_among(faults, join(path, "clamp"), body.clamp, sets_of(body));
+  if (body.clamp != "root" && body.basis.name != "clamped" && faults.clean(join(path, "basis")))
+    faults.add(join(path, "clamp"),
+               fmt::format("is {}, but the basis \"{}\" {}; drop it", toml_reader::quoted(body.clamp), body.basis.name,
+                           body.basis.name == "hinge" ? "is that of a hinge at the root"
+                                                      : "is not held by a clamp, but by its interfaces or nowhere"));
+}
+
+void check_interfaces(Faults& faults, const std::string& path, const BodyScene& body) {
+  const BasisOptions& basis = body.basis;
+  std::vector<std::string> names;
+  for (const std::string& text : basis.interfaces) {
+    names.push_back(text.substr(0, text.find(':')));
+    check_name_among(faults, join(path, "interfaces"), names.back(), sets_of(body));
+    const std::string connection = text.substr(names.back().size());
+    if (!connection.empty() && connection != ":rigid" && connection != ":distributing")
+      faults.add(join(path, "interfaces"), fmt::format("has {}; behind the place stands nothing, \":rigid\" or "
+                                                       "\":distributing\"",
+                                                       toml_reader::quoted(text)));
+  }
+  if (basis.reference.empty())
+    return faults.add(join(path, "reference"),
+                      "is empty: the coordinates would hold the motion of the whole body, which its joint has, too; "
+                      "name the interface that carries the frame");
+  check_name_among(faults, join(path, "reference"), basis.reference,
+                   std::vector<std::string_view>(names.begin(), names.end()));
+}
+
+/// Keys that belong to another basis, and what each basis needs.
+void check_basis(Faults& faults, const std::string& path, const BodyScene& body) {
+  const BasisOptions& basis = body.basis;
+  check_name_among(faults, join(path, "basis"), basis.name, basis_names);
+  if (!faults.clean(join(path, "basis"))) return;
+  const auto belongs = [&](bool given, const char* key, std::string_view name) {
+    if (given && basis.name != name)
+      faults.add(join(path, key), fmt::format("belongs to basis = \"{}\", this one is \"{}\"", name, basis.name));
+  };
+  belongs(!basis.interfaces.empty(), "interfaces", "craig-bampton");
+  belongs(!basis.reference.empty(), "reference", "craig-bampton");
+  belongs(basis.orthonormal, "orthonormal", "craig-bampton");
+  belongs(!basis.hinge_stiffness.empty(), "hinge_stiffness", "hinge");
+  belongs(basis.hinge_axis != BasisOptions{}.hinge_axis, "hinge_axis", "hinge");
+  const bool elements = body.structure == "beam" || body.structure == "solid";
+  if (basis.name != "clamped" && !elements)
+    faults.add(join(path, "basis"), fmt::format("is \"{}\", which needs finite elements: structure \"beam\" or "
+                                                "\"solid\", not \"{}\"",
+                                                basis.name, body.structure));
+  if (!basis.corrections.empty() && !elements)
+    faults.add(join(path, "corrections"), "need finite elements: structure \"beam\" or \"solid\"");
+  if (basis.name == "craig-bampton") check_interfaces(faults, path, body);
+  if (!(basis.hinge_axis.allFinite() && basis.hinge_axis.norm() > 0))
+    faults.add(join(path, "hinge_axis"), "has no direction; give [x, y, z] in the axes of the body");
+  for (const double k : basis.hinge_stiffness) check_not_negative(faults, join(path, "hinge_stiffness"), k, " N m/rad");
+  for (const std::string& text : basis.corrections) try {
+      const auto [set, direction] = place_and_direction("is not understood", text);
+      check_name_among(faults, join(path, "corrections"), set, sets_of(body));
+      if (!direction.starts_with('F') && !direction.starts_with('M'))
+        throw InputError(fmt::format("has {}; a load is Fx, Fy, Fz, Mx, My or Mz", toml_reader::quoted(text)));
+      component_of(direction);
+    } catch (const InputError& error) {
+      faults.add(join(path, "corrections"), error.what());
+    }
 }
 
 void check_rigid(Faults& faults, const std::string& path, const RigidScene& body) {
@@ -254,10 +322,15 @@ void check_body(const BodyScene& body, const std::string& path, Faults& faults) 
   check_name(faults, join(path, "name"), body.name);
   if (!body.stiffening.empty()) check_stiffening(faults, path, body);
   if (body.rigid) return check_rigid(faults, path, *body.rigid);
+  if (body.reduced && body.reduced->frame == "free")
+    faults.add(join(path, "file"),
+               "has coordinates that hold the motion of the whole body, which its joint has, too; reduce it with "
+               "--reference");
   if (body.reduced || !body.reduced_file.empty()) return check_damping(faults, join(path, "damping"), body.damping);
   check_name_among(faults, join(path, "structure"), body.structure, scene_keys::structures);
   check_name_among(faults, join(path, "directions"), body.directions, scene_keys::directions);
   check_name_among(faults, join(path, "backend"), body.backend, backend_names());
+  check_basis(faults, path, body);
   check_clamp(faults, path, body);
   if (body.modes < 0 || body.modes > max_modes) {
     faults.add(join(path, "modes"), fmt::format("is {}; it must be 0 to {}, or \"auto\"", body.modes, max_modes));

@@ -65,7 +65,7 @@ struct ReduceArguments {
   std::string model;
   ModelOptions options;
   std::filesystem::path file;
-  std::string basis = "clamped";  // "clamped", "mean-axis", "craig-bampton", "hinge"
+  std::optional<std::string> basis;  // one of basis_names; what the file asks for, or "clamped"
   std::optional<int> count;
   std::optional<std::string> backend;
   std::vector<std::string> interfaces;  // "SET" or "SET:distributing"
@@ -73,7 +73,7 @@ struct ReduceArguments {
   bool orthonormal = false;
   std::vector<std::string> attachments;  // "SET.Fy"
   std::vector<double> hinge_stiffness;   // [N m/rad]
-  std::vector<double> hinge_axis = {0, 0, 1};
+  std::vector<double> hinge_axis;        // of three; empty: z
   std::optional<std::string> select;   // "list:1,3", "band:0,500", "mass:0.9", "completeness:0.9", "output:tip.uy,0.01"
   std::optional<std::string> damping;  // "modal:0.005", "loss-factor:0.01", "rayleigh:ALPHA,BETA", "none"
   bool stiffening = true;

@@ -3,6 +3,7 @@
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
 #include "reduction/eq14.hpp"
+#include "reduction/inertia_invariants.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/SVD>

@@ -3,6 +3,7 @@
 #include "fem/blas_threads.hpp"
 #include "fem/check.hpp"
 #include "fem/heap.hpp"
+#include "reduction/basis.hpp"
 #include "reduction/exports.hpp"
 
 #include <fmt/format.h>
@@ -116,8 +117,8 @@ struct CommandLine {
     CLI::App* c = command("reduce", "mesh -> reduced body: basis, shapes, invariants, stiffening, certificate");
     c->add_option("BODY", reduce.model, "Body file (.toml) or mesh (.inp, .msh, .bdf, .vtu, .step, .geo)")->required();
     c->add_option("-o,--output", reduce.file, "Body to write (.h5)")->required();
-    c->add_option("--basis", reduce.basis, "clamped, mean-axis, craig-bampton or hinge")
-        ->check(CLI::IsMember({"clamped", "mean-axis", "craig-bampton", "hinge"}));
+    c->add_option("--basis", reduce.basis, "clamped, mean-axis, craig-bampton or hinge (default: the file's)")
+        ->check(CLI::IsMember(std::vector<std::string>(basis_names.begin(), basis_names.end())));
     c->add_option("--count", reduce.count, "Modes (default: what the file asks for, or 10; of a hinge per stiffness)");
     c->add_option("--backend", reduce.backend, "Eigen-solver: auto, arpack, block, spectra or dense");
     c->add_option("--clamp", reduce.options.clamp,

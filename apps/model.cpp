@@ -1,6 +1,6 @@
 #include "apps/model.hpp"
 
-#include "apps/scene.hpp"
+#include "apps/prepared_body.hpp"
 #include "fem/check.hpp"
 #include "fem/mesh_file.hpp"
 
@@ -28,10 +28,11 @@ Model body_model(const std::filesystem::path& path, const ModelOptions& options)
   }
   Model model;
   model.name = body.name;
-  model.mesh = solid ? make_solid_mesh(body.geometry, body.solid) : make_mesh(body.geometry);
+  model.mesh = mesh_of(body);
   if (body.modes_given && !body.modes_auto && body.modes > 0) model.modes = body.modes;
   model.backend = body.backend;
   model.damping = body.damping;
+  model.basis = body.basis;
   if (body.structure == "eq14")
     model.notes.emplace_back(
         "modes solves finite elements; the closed form of structure = \"eq14\" is in `flexboom compare`");

@@ -2,6 +2,7 @@
 
 #include "fem/constraints.hpp"
 #include "fem/mesh_file.hpp"
+#include "reduction/basis.hpp"
 #include "reduction/reduced_body.hpp"
 
 #include <filesystem>
@@ -32,6 +33,7 @@ struct Model {
   std::vector<std::string> notes;      // what was read as something else, and what is most likely a mistake
   std::optional<std::string> backend;  // eigen-solver that the file asks for
   DampingRule damping;                 // none of mesh files
+  BasisOptions basis;                  // its names and places; clamped of mesh files
 };
 
 /// @throws InputError naming the file and the place in it, a set that it lacks, or an option that does not apply to it.

@@ -3,14 +3,12 @@
 #include "apps/prepared_body.hpp"
 
 #include "apps/picture.hpp"
+#include "apps/reduction.hpp"
 #include "apps/version.hpp"
-#include "fem/assembly.hpp"
 #include "fem/check.hpp"
 #include "fem/solid_boom.hpp"
 #include "reduction/body_file.hpp"
 #include "reduction/eq14.hpp"
-#include "reduction/geometric_stiffness.hpp"
-#include "reduction/modal_basis.hpp"
 #include "reduction/sha256.hpp"
 
 #include <fmt/format.h>
@@ -44,6 +42,7 @@ PreparedBody prepared(ReducedBody body) {
   p.body = std::move(body);
   p.dofs = p.body.full_freedoms;
   p.checks = p.body.certificate;
+  p.modes = p.body.n();
   return p;
 }
 
@@ -69,15 +68,6 @@ PreparedBody prepare_eq14(const BodyScene& b) {
   return r;
 }
 
-/// Where loads act for geometric stiffness.
-std::vector<std::string> moving_markers(const ReducedBody& body, const Mesh& mesh) {
-  std::vector<std::string> names;
-  for (const Marker& m : body.markers)
-    if (mesh.node_sets.contains(m.name) && m.S.norm() > 0) names.push_back(m.name);
-  return names;
-}
-
-/// Elements of a boom: `refine` raises their order, or where that is the highest makes them smaller.
 Mesh beam_mesh(BeamGeometry geometry, int refine) {
   constexpr int highest = 12;
   if (geometry.order + refine <= highest) {
@@ -89,38 +79,41 @@ Mesh beam_mesh(BeamGeometry geometry, int refine) {
 }
 
 Mesh solid_mesh(const BodyScene& b, int refine) {
+  if (b.solid.element != "hex") {
+    require(refine == 0, fmt::format("body {}: elements {} have no higher order to be compared with; use \"hex\"",
+                                     b.name, b.solid.element));
+    return make_solid_mesh(b.geometry, b.solid);
+  }
   SolidOptions options = chosen(b.geometry, b.solid);
   constexpr int highest = 8;
-  require(refine == 0 || options.element == "hex",
-          fmt::format("body {}: elements {} have no higher order to be compared with; use \"hex\"", b.name,
-                      options.element));
   options.order = std::min(options.order + refine, highest);
   return make_solid_mesh(b.geometry, options);
 }
 
+/// What a scene says of a basis, its shapes chosen by `modes` and `directions`.
+BasisOptions basis_of(const BodyScene& b) {
+  BasisOptions o = b.basis;
+  o.modes = b.modes;
+  o.in_plane = b.directions != "all";
+  o.backend = b.backend;
+  return o;
+}
+
 PreparedBody prepare_model(const BodyScene& b, int refine) {
-  const Mesh mesh = b.structure == "solid" ? solid_mesh(b, refine) : beam_mesh(b.geometry, refine);
-  const Assembly assembly = assemble(mesh);
-  const std::vector<int>& clamp = node_set(mesh, b.clamp);
-  PreparedBody r;
-  ModalBasis basis;
-  basis.Phi = MatrixXd::Zero(assembly.dofs.count, 0);
-  basis.omega = VectorXd::Zero(0);
-  if (b.structure != "rigid" && b.modes > 0) {
-    EigenOptions options;
-    options.backend = b.backend;
-    options.num_modes = b.modes;
-    const std::vector<ModeKind> kinds =
-        b.directions == "all" ? std::vector<ModeKind>{} : std::vector{ModeKind::bending_y};
-    basis = clamped_modes_of_kind(mesh, assembly, clamp, b.modes, kinds, options);
-  }
-  r.body = reduce(mesh, assembly, basis, b.name);
-  r.checks = check_invariants(r.body, mesh, assembly, basis);
-  if (!b.stiffening.empty() && r.body.n() > 0)
-    r.body.Kg = geometric_stiffness(mesh, assembly, clamp, basis.Phi, {.markers = moving_markers(r.body, mesh)});
-  r.eigen = basis.summary;
-  r.elements = static_cast<int>(mesh.elements.size());
-  r.dofs = basis.unknowns;
+  Model model;
+  model.name = b.name;
+  model.mesh = mesh_of(b, refine);
+  model.clamp = node_set(model.mesh, b.clamp);
+  ReductionOptions o;
+  o.basis = basis_of(b);
+  if (b.structure == "rigid") o.basis.modes = 0;
+  o.stiffening = !b.stiffening.empty();
+  o.damping = b.damping;
+  o.certified = false;
+  ReductionSeconds seconds;
+  PreparedBody r = prepared(make_reduced_body(model, o, 1, seconds));
+  r.elements = static_cast<int>(model.mesh.elements.size());
+  r.notes = std::move(model.notes);
   if (b.structure == "rigid") r.body.structure = "rigid";
   return r;
 }
@@ -158,6 +151,10 @@ void write_kept(const std::filesystem::path& file, const PreparedBody& p) {
 
 }  // namespace
 
+Mesh mesh_of(const BodyScene& b, int refine) {
+  return b.structure == "solid" ? solid_mesh(b, refine) : beam_mesh(b.geometry, refine);
+}
+
 PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem::path& keep) {
   if (b.rigid) return prepare_rigid(b);
   if (b.reduced) return prepare_reduced(b);
@@ -167,9 +164,10 @@ PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem:
   const std::filesystem::path file =
       b.structure == "solid" && !keep.empty() ? kept_file(b, refine, keep) : std::filesystem::path();
   if (!file.empty())
-    if (std::optional<PreparedBody> kept = read_kept(file)) return *kept;
+    if (std::optional<PreparedBody> kept = read_kept(file)) return kept->modes = b.modes, *std::move(kept);
   PreparedBody r = b.structure == "eq14" ? prepare_eq14(b) : prepare_model(b, refine);
   apply_damping(r.body, b.damping);
+  r.modes = b.modes;
   for (const BodyCheck& c : r.checks)
     if (!c.passed)
       throw NumericalError(fmt::format("body {}: invariant {} = {:.17g}, but {:.17g} by an independent route", b.name,

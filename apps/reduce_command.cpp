@@ -16,7 +16,7 @@ int reduce_command(const ReduceArguments& a, const CommonOptions& common) {
   const Stopwatch clock;
   Model model = load_model(a.model, a.options);
   ReductionSeconds seconds{.mesh = clock.seconds()};
-  const ReducedBody body = make_reduced_body(model, a, common.threads, seconds);
+  const ReducedBody body = make_reduced_body(model, reduction_options(a, model), common.threads, seconds);
   write_body_file(a.file, body);
   seconds.total = clock.seconds();
   if (common.json) {

@@ -6,13 +6,9 @@
 #include "fem/mesh_sets.hpp"
 #include "fem/stopwatch.hpp"
 #include "fem/text_reader.hpp"
-#include "reduction/attachment_modes.hpp"
 #include "reduction/certificate.hpp"
-#include "reduction/craig_bampton.hpp"
 #include "reduction/geometric_stiffness.hpp"
-#include "reduction/hinge_basis.hpp"
 #include "reduction/inertia_invariants.hpp"
-#include "reduction/mean_axis.hpp"
 #include "reduction/mode_selection.hpp"
 #include "reduction/root_loads.hpp"
 
@@ -49,82 +45,45 @@ std::vector<double> numbers(const std::string& option, const std::string& text) 
   return result;
 }
 
-/// A node set and a component, "tip.uy".
-std::pair<std::string, std::string> place_and_direction(const std::string& option, const std::string& text) {
-  const size_t dot = text.rfind('.');
-  require(dot != std::string::npos && dot > 0,
-          fmt::format("{}: '{}' must be a node set and a direction, e.g. tip.Fy", option, text));
-  return {text.substr(0, dot), text.substr(dot + 1)};
-}
-
-void check_options(const ReduceArguments& a) {
-  const auto belongs = [&a](bool given, const char* option, const char* basis) {
-    require(!given || a.basis == basis, fmt::format("{}: is for --basis {}", option, basis));
+void check_options(const ReduceArguments& a, const BasisOptions& basis) {
+  const auto belongs = [&basis](bool given, const char* option, const char* name) {
+    require(!given || basis.name == name, fmt::format("{}: is for --basis {}", option, name));
   };
   belongs(!a.interfaces.empty(), "--interface", "craig-bampton");
   belongs(!a.reference.empty(), "--reference", "craig-bampton");
   belongs(a.orthonormal, "--orthonormal", "craig-bampton");
   belongs(!a.hinge_stiffness.empty(), "--hinge-stiffness", "hinge");
-  require(a.basis != "craig-bampton" || !a.interfaces.empty(),
+  require(basis.name != "craig-bampton" || !basis.interfaces.empty(),
           "--basis craig-bampton: name the places where the body is joined with --interface SET");
-  require(a.basis != "hinge" || !a.hinge_stiffness.empty(),
+  require(basis.name != "hinge" || !basis.hinge_stiffness.empty(),
           "--basis hinge: give the stiffness of the hinge with --hinge-stiffness K1,K2 [N m/rad]");
-  require(a.basis != "mean-axis" || !a.options.clamp, "--clamp: a body under mean axes is not held anywhere");
+  require(basis.name != "mean-axis" || !a.options.clamp, "--clamp: a body under mean axes is not held anywhere");
   require(a.stiffening || a.loads_at.empty(), "--loads-at: loads stiffen nothing with --no-stiffening");
   require(std::set(a.loads_at.begin(), a.loads_at.end()).size() == a.loads_at.size(), "--loads-at: a set comes twice");
   require(!a.count || *a.count >= 0, fmt::format("--count: must not be negative, got {}", a.count.value_or(0)));
 }
 
-EigenOptions eigen_options(const Model& model, const ReduceArguments& a) {
-  EigenOptions options;
-  options.num_modes = a.count.value_or(model.modes.value_or(10));
-  options.backend = a.backend.value_or(model.backend.value_or("auto"));
-  options.keep_factor = a.basis == "clamped";  // for the stiffening and the certificate
-  return options;
-}
-
-/// A model ready for its basis. Interfaces change the mesh, so they come before the assembly.
-struct Assembled {
-  std::vector<InterfaceNode> interfaces;
-  Assembly assembly;
-  Clamp clamp;  // what the basis is made with
-};
-
-Assembled assembled(Model& model, const ReduceArguments& a, int threads) {
-  Assembled result;
-  std::vector<InterfacePlan> plans;
-  for (const std::string& text : a.interfaces) {
-    const auto [set, connection] = split(text, ':');
-    plans.push_back({.name = set, .node_set = set, .connection = connection.empty() ? "rigid" : connection});
-  }
-  result.interfaces = place_interfaces(model.mesh, plans);
-  result.assembly = assemble(model.mesh, threads);
-  result.clamp = model.clamp;
-  // Interfaces and mean axes hold the body themselves; a clamp is then only what the user names.
-  if (a.basis == "mean-axis") result.clamp = Clamp({}, false);
-  if (a.basis == "craig-bampton" && !a.options.clamp) result.clamp.nodes.clear();
-  return result;
+/// The basis of the command line; what it leaves open is that of the body file.
+BasisOptions basis_options(const ReduceArguments& a, const Model& model) {
+  BasisOptions o;
+  if (!a.basis || *a.basis == model.basis.name) o = model.basis;
+  if (a.basis) o.name = *a.basis;
+  if (!a.interfaces.empty()) o.interfaces = a.interfaces, o.reference = a.reference;
+  if (!a.reference.empty()) o.reference = a.reference;
+  o.orthonormal = o.orthonormal || a.orthonormal;
+  if (!a.attachments.empty()) o.corrections = a.attachments;
+  if (!a.hinge_stiffness.empty()) o.hinge_stiffness = a.hinge_stiffness;
+  if (!a.hinge_axis.empty()) o.hinge_axis = Eigen::Vector3d(a.hinge_axis[0], a.hinge_axis[1], a.hinge_axis[2]);
+  o.in_plane = o.name == "hinge";
+  o.modes = a.count.value_or(o.name == "hinge" ? 1 : model.modes.value_or(10));
+  o.backend = a.backend.value_or(model.backend.value_or("auto"));
+  return o;
 }
 
 /// Static solutions over the unknowns of a held body, by the factor of its modes where they were solved with this K.
-StaticSolver statics_of(const Model& model, const Assembly& assembly, const Clamp& held, const ModalBasis& basis) {
+StaticSolver statics_of(const Mesh& mesh, const BasisModel& m, const ModalBasis& basis) {
   if (basis.factor) return StaticSolver(basis.factor, basis.K);
-  return static_solver(model.mesh, assembly, unknowns(model.mesh, assembly.dofs, held));
-}
-
-ModalBasis basis_of(const Model& model, const Assembled& m, const ReduceArguments& a, int threads) {
-  const EigenOptions options = eigen_options(model, a);
-  const Mesh& mesh = model.mesh;
-  if (a.basis == "mean-axis") return mean_axis_modes(mesh, m.assembly, options, threads);
-  if (a.basis == "craig-bampton")
-    return craig_bampton(mesh, m.assembly, m.interfaces, {options, a.reference, a.orthonormal}, m.clamp, threads);
-  if (a.basis == "hinge") {
-    HingeSpring hinge;
-    hinge.axis = Eigen::Vector3d(a.hinge_axis[0], a.hinge_axis[1], a.hinge_axis[2]);
-    hinge.stiffness = a.hinge_stiffness;
-    return hinge_adapted_modes(mesh, m.assembly, m.clamp, hinge, a.count.value_or(1), options, threads);
-  }
-  return clamped_modes(mesh, m.assembly, m.clamp, options, threads);
+  return static_solver(mesh, m.assembly, unknowns(mesh, m.assembly.dofs, m.held));
 }
 
 /// Coordinates that --select keeps, counted from 0.
@@ -154,10 +113,10 @@ std::vector<int> selection(const ReducedBody& body, const std::string& text) {
 }
 
 /// Where the basis holds the static response exactly.
-std::vector<std::string> exact_markers(const ReduceArguments& a) {
+std::vector<std::string> exact_markers(const ReductionOptions& o) {
   std::vector<std::string> markers;
-  if (a.select) return markers;
-  for (const std::string& text : a.interfaces) markers.push_back(split(text, ':').first);
+  if (o.select || o.basis.in_plane) return markers;
+  for (const std::string& text : o.basis.interfaces) markers.push_back(split(text, ':').first);
   return markers;
 }
 
@@ -168,36 +127,38 @@ std::string libraries() {
   return text;
 }
 
-std::string options_text(const ReduceArguments& a, const EigenOptions& options) {
-  std::string text = fmt::format("basis {}, count {}", a.basis, options.num_modes);
-  if (!a.interfaces.empty()) text += fmt::format(", interfaces {}", fmt::join(a.interfaces, " "));
-  if (!a.reference.empty()) text += ", reference " + a.reference;
-  if (a.orthonormal) text += ", orthonormal";
-  if (!a.attachments.empty()) text += fmt::format(", attachments {}", fmt::join(a.attachments, " "));
-  if (!a.hinge_stiffness.empty())
-    text += fmt::format(", hinge {} N m/rad about {}", fmt::join(a.hinge_stiffness, " "), fmt::join(a.hinge_axis, " "));
-  if (a.select) text += ", select " + *a.select;
-  if (a.damping) text += ", damping " + *a.damping;
-  if (!a.stiffening) text += ", no stiffening";
-  if (!a.loads_at.empty()) text += fmt::format(", loads at {}", fmt::join(a.loads_at, " "));
+std::string options_text(const ReductionOptions& o) {
+  const BasisOptions& b = o.basis;
+  std::string text = fmt::format("basis {}, count {}", b.name, b.modes);
+  if (!b.interfaces.empty()) text += fmt::format(", interfaces {}", fmt::join(b.interfaces, " "));
+  if (!b.reference.empty()) text += ", reference " + b.reference;
+  if (b.orthonormal) text += ", orthonormal";
+  if (!b.corrections.empty()) text += fmt::format(", attachments {}", fmt::join(b.corrections, " "));
+  if (b.name == "hinge")
+    text += fmt::format(", hinge {} N m/rad about {} {} {}", fmt::join(b.hinge_stiffness, " "), b.hinge_axis.x(),
+                        b.hinge_axis.y(), b.hinge_axis.z());
+  if (o.select) text += ", select " + *o.select;
+  if (o.damping.name != "none") text += ", damping " + o.damping.name;
+  if (!o.stiffening) text += ", no stiffening";
+  if (!o.loads_at.empty()) text += fmt::format(", loads at {}", fmt::join(o.loads_at, " "));
   return text;
 }
 
 /// The options with the names of node sets as the mesh spells them.
-ReduceArguments with_names_of(const Mesh& mesh, ReduceArguments a) {
+ReductionOptions with_names_of(const Mesh& mesh, ReductionOptions o) {
   const auto spell = [&mesh](std::string& text, size_t end) {  // the name ends there, or with the text
     text = node_set_name(mesh, text.substr(0, end)) + (end < text.size() ? text.substr(end) : "");
   };
-  for (std::string& text : a.interfaces) spell(text, text.find(':'));
-  for (std::string& text : a.attachments) spell(text, text.rfind('.'));
-  for (std::string& text : a.loads_at) spell(text, std::string::npos);
-  if (!a.reference.empty()) spell(a.reference, std::string::npos);
-  if (a.select && a.select->starts_with("output:")) {
-    std::string place = a.select->substr(std::string("output:").size());
+  for (std::string& text : o.basis.interfaces) spell(text, text.find(':'));
+  for (std::string& text : o.basis.corrections) spell(text, text.rfind('.'));
+  for (std::string& text : o.loads_at) spell(text, std::string::npos);
+  if (!o.basis.reference.empty()) spell(o.basis.reference, std::string::npos);
+  if (o.select && o.select->starts_with("output:")) {
+    std::string place = o.select->substr(std::string("output:").size());
     spell(place, place.rfind('.', place.find(',')));
-    a.select = "output:" + place;
+    o.select = "output:" + place;
   }
-  return a;
+  return o;
 }
 
 /// Node sets that the body keeps as markers and where loads act for geometric stiffness: all that move, or those asked
@@ -226,54 +187,58 @@ DampingRule parse_damping(const std::string& text) {
       "--damping: '{}' is not understood; there are none, modal:ZETA, loss-factor:ETA, rayleigh:ALPHA,BETA", text));
 }
 
-ReducedBody make_reduced_body(Model& model, const ReduceArguments& arguments, int threads, ReductionSeconds& seconds) {
-  check_options(arguments);
-  const ReduceArguments a = with_names_of(model.mesh, arguments);
-  for (const std::string& name : a.loads_at) node_set(model.mesh, name);  // before the long work
+ReductionOptions reduction_options(const ReduceArguments& a, const Model& model) {
+  ReductionOptions o;
+  o.basis = basis_options(a, model);
+  check_options(a, o.basis);
+  o.clamp_beside = a.options.clamp.has_value();
+  o.select = a.select;
+  o.damping = a.damping ? parse_damping(*a.damping) : model.damping;
+  o.stiffening = a.stiffening;
+  o.loads_at = a.loads_at;
+  o.source = a.model;
+  return o;
+}
+
+ReducedBody make_reduced_body(Model& model, const ReductionOptions& options, int threads, ReductionSeconds& seconds) {
+  ReductionOptions o = with_names_of(model.mesh, options);
+  for (const std::string& name : o.loads_at) node_set(model.mesh, name);  // before the long work
+  const bool held_is_solved = o.stiffening || o.certified;
+  o.basis.keep_factor = o.basis.name == "clamped" && held_is_solved;
   Stopwatch clock;
-  const DampingRule damping = a.damping ? parse_damping(*a.damping) : model.damping;
-  const Assembled m = assembled(model, a, threads);
+  const BasisModel m = basis_model(model.mesh, o.basis, model.clamp, o.clamp_beside, threads);
   seconds.assemble += clock.lap();
-  ModalBasis basis = basis_of(model, m, a, threads);
-  std::vector<AttachmentLoad> loads;
-  for (const std::string& text : a.attachments) {
-    const auto [marker, direction] = place_and_direction("--attach", text);
-    loads.push_back({marker, direction});
-  }
-  if (!loads.empty()) basis = with_attachment_modes(std::move(basis), model.mesh, m.assembly, m.clamp, loads, threads);
+  ModalBasis basis = make_basis(model.mesh, m, o.basis, threads);
   seconds.modes += clock.lap();
   ReducedBody body = reduce(model.mesh, m.assembly, basis, model.name, threads);
   seconds.invariants += clock.lap();
-  if (a.select) {
-    const std::vector<int> list = selection(body, *a.select);
+  if (o.select) {
+    const std::vector<int> list = selection(body, *o.select);
     basis = selected(basis, list);
     body = selected(body, list);
   }
   if (!basis.summary.note.empty()) model.notes.push_back(basis.summary.note);
-  if (!basis.summary.proof.empty()) model.notes.push_back(basis.summary.proof);
+  if (o.certified && !basis.summary.proof.empty()) model.notes.push_back(basis.summary.proof);
 
-  // What holds the body when it is loaded: its clamp, and the interface that carries its frame.
-  Clamp held = m.clamp;
-  for (const InterfaceNode& i : m.interfaces) {
-    if (i.name == a.reference) held.nodes.push_back(i.node);
-  }
   const bool flies = body.frame == "clamped" || body.frame == "mean-axis";
   std::optional<StaticSolver> statics;  // one factorisation for the stiffening and the certificate
-  if (body.frame == "clamped" && body.n() > 0) statics = statics_of(model, m.assembly, held, basis);
+  if (body.frame == "clamped" && body.n() > 0 && held_is_solved) statics = statics_of(model.mesh, m, basis);
   const StaticSolver* held_statics = statics ? &*statics : nullptr;
-  if (a.stiffening && flies && body.n() > 0) {
-    body.Kg = geometric_stiffness(model.mesh, m.assembly, held, basis.Phi,
-                                  {.markers = loaded_markers(body, model.mesh, a.loads_at),
+  if (o.stiffening && flies && body.n() > 0) {
+    body.Kg = geometric_stiffness(model.mesh, m.assembly, m.held, basis.Phi,
+                                  {.markers = loaded_markers(body, model.mesh, o.loads_at),
                                    .threads = threads,
                                    .statics = held_statics,
                                    .Ke = &body.Ke});
   }
   seconds.stiffening += clock.lap();
-  apply_damping(body, damping);
-  body.certificate = certificate(body, model.mesh, m.assembly, held, basis, exact_markers(a), threads, held_statics);
+  apply_damping(body, o.damping);
+  body.certificate =
+      o.certified ? certificate(body, model.mesh, m.assembly, m.held, basis, exact_markers(o), threads, held_statics)
+                  : check_invariants(body, model.mesh, m.assembly, basis);
   seconds.certificate += clock.lap();
-  body.provenance = {fmt::format("flexboom {}", version), libraries(), a.model, mesh_hash(model.mesh),
-                     options_text(a, eigen_options(model, a))};
+  body.provenance = {fmt::format("flexboom {}", version), libraries(), o.source, mesh_hash(model.mesh),
+                     options_text(o)};
   body.validate();
   return body;
 }

@@ -1,10 +1,12 @@
 #pragma once
 
 #include "apps/commands.hpp"
+#include "reduction/basis.hpp"
 #include "reduction/reduced_body.hpp"
 
 #include <nlohmann/json.hpp>
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,11 +17,25 @@ struct ReductionSeconds {
   double mesh = 0, assemble = 0, modes = 0, invariants = 0, stiffening = 0, certificate = 0, total = 0;
 };
 
-/// The reduced body that `flexboom reduce` writes, with its certificate and provenance. The mesh of `model` may get
-/// reference nodes of interfaces; its notes grow by what the basis has to say.
-/// Adds the time of its stages to `seconds`.
-/// @throws InputError for options that do not fit each other or the model, NumericalError as the bases.
-ReducedBody make_reduced_body(Model& model, const ReduceArguments&, int threads, ReductionSeconds& seconds);
+/// How a model becomes a reduced body, by `flexboom reduce` and for a flight.
+struct ReductionOptions {
+  BasisOptions basis;
+  bool clamp_beside = false;  // the model's clamp holds beside interfaces
+  std::optional<std::string> select;
+  DampingRule damping;
+  bool stiffening = true;
+  std::vector<std::string> loads_at;  // node sets; empty: every marker that moves
+  bool certified = true;              // false: the certificate has the invariants alone
+  std::string source;                 // of the model, for the provenance
+};
+
+/// What the command line asks for. @throws InputError for options that do not fit each other or the model.
+ReductionOptions reduction_options(const ReduceArguments&, const Model&);
+
+/// The reduced body with its certificate and provenance. The mesh of `model` may get reference nodes of interfaces; its
+/// notes grow by what the basis has to say. Adds the time of its stages to `seconds`.
+/// @throws InputError for a place that the model lacks, NumericalError as the bases.
+ReducedBody make_reduced_body(Model& model, const ReductionOptions&, int threads, ReductionSeconds& seconds);
 
 /// Mass, centre, inertia, coordinate table and checks of a body, as text.
 std::string description(const ReducedBody&, const std::vector<BodyCheck>& checks);

@@ -169,6 +169,19 @@ DampingRule read_damping(TableReader& table, const DampingRule& otherwise) {
   return rule;
 }
 
+/// The basis; interfaces are the ends of the boom unless they are named.
+BasisOptions read_basis(TableReader& table, BasisOptions basis) {
+  basis.name = table.text("basis", basis.name);
+  const bool ends = basis.name == "craig-bampton" && basis.interfaces.empty();
+  basis.interfaces = table.texts("interfaces", ends ? std::vector<std::string>{"root", "tip"} : basis.interfaces);
+  basis.reference = table.text("reference", ends ? "root" : basis.reference);
+  basis.orthonormal = table.boolean("orthonormal", basis.orthonormal);
+  if (table.has("hinge_stiffness")) basis.hinge_stiffness = table.numbers("hinge_stiffness");
+  basis.hinge_axis = table.vector("hinge_axis", basis.hinge_axis);
+  basis.corrections = table.texts("corrections", basis.corrections);
+  return basis;
+}
+
 /// What a scene may also say of a body whose geometry comes from a file.
 void read_model(TableReader& table, BodyScene& body) {
   body.structure = table.text("structure", body.structure);
@@ -185,6 +198,7 @@ void read_model(TableReader& table, BodyScene& body) {
     body.modes = table.integer("modes", body.modes);
   }
   body.directions = table.text("directions", body.directions);
+  body.basis = read_basis(table, body.basis);
   body.backend = table.text("backend", body.backend);
   body.damping = read_damping(table, body.damping);
 }
@@ -262,11 +276,10 @@ BodyScene read_reduced_body(TableReader& table, Reading& reading) {
   return body;
 }
 
-/// `in_tree`: of a scene with joints.
-BodyScene read_body_entry(TableReader table, bool in_tree, Reading& reading) {
-  if (in_tree && table.has("mass")) return read_rigid_body(table, reading);
-  if (in_tree && table.is_text("file") && table.text("file").ends_with(".h5")) return read_reduced_body(table, reading);
-  const std::string stiffening = in_tree ? table.text("stiffening", "auto") : "";
+BodyScene read_body_entry(TableReader table, Reading& reading) {
+  if (table.has("mass")) return read_rigid_body(table, reading);
+  if (table.is_text("file") && table.text("file").ends_with(".h5")) return read_reduced_body(table, reading);
+  const std::string stiffening = table.text("stiffening", "");
   BodyScene body;
   if (table.has("file")) {
     body = read_body_from_file(table, reading);
@@ -373,24 +386,36 @@ void read_around_hub(TableReader& table, Scene& scene, Reading& reading) {
 }
 
 /// Is there anything that a scene of [hub] and [[hinges]] alone cannot have? They are shorthand then.
-bool beyond_a_hub(TableReader& table) {
-  if (std::ranges::any_of(std::array{"joints", "springs", "loads", "wheels", "turns", "gravity"},
-                          [&](const char* key) { return table.has(key); }))
-    return true;
-  const auto says_more = [](const Value& body) {
-    return std::ranges::any_of(body.entries, [](const auto& entry) {
-      return entry.first == "stiffening" || entry.first == "mass" ||
-             (entry.first == "file" && entry.second.text.ends_with(".h5"));
-    });
-  };
+bool beyond_a_hub(TableReader& table, const std::vector<BodyScene>& bodies) {
   const auto has_law = [](const Value& hinge) {
     return std::ranges::any_of(hinge.entries, [](const auto& entry) { return is_law_key(entry.first); });
   };
-  return std::ranges::any_of(table.value().entries, [&](const auto& entry) {
-    const auto& [key, value] = entry;
-    return (key == "bodies" && std::ranges::any_of(value.items, says_more)) ||
-           (key == "hinges" && std::ranges::any_of(value.items, has_law));
-  });
+  const auto hinges_have_laws = [&](const auto& entry) {
+    return entry.first == "hinges" && std::ranges::any_of(entry.second.items, has_law);
+  };
+  return std::ranges::any_of(table.value().entries, hinges_have_laws) ||
+         std::ranges::any_of(std::array{"joints", "springs", "loads", "wheels", "turns", "gravity"},
+                             [&](const char* key) { return table.has(key); }) ||
+         std::ranges::any_of(bodies, [](const BodyScene& b) {
+           return b.rigid || !b.reduced_file.empty() || !b.stiffening.empty() || b.root_moves();
+         });
+}
+
+/// The regimes of the hinge that a body hangs on are those its basis is made for, unless it names others.
+void take_hinge(BodyScene& body, const HingeMechanism& m, const Vector3d& axis) {
+  if (body.basis.name != "hinge" || !body.basis.hinge_stiffness.empty()) return;
+  body.basis.hinge_stiffness = {m.stiffness};
+  if (m.stop_stiffness > 0) body.basis.hinge_stiffness.push_back(m.stiffness + m.stop_stiffness);
+  body.basis.hinge_axis = axis;
+}
+
+void take_hinges(Scene& scene) {
+  for (BodyScene& body : scene.bodies) {
+    for (const HingeScene& h : scene.hinges)
+      if (h.body == body.name) take_hinge(body, h.hinge.mechanism, Vector3d::UnitZ());
+    for (const JointScene& j : scene.joints)
+      if (j.b.body == body.name && j.kind == JointKind::hinge && !j.closes_loop) take_hinge(body, j.mechanism, j.b.z);
+  }
 }
 
 /// Writes [hub] and [[hinges]] out: a rigid body that flies, or the inertial frame where it is fixed, and joints.
@@ -398,7 +423,7 @@ void write_out_shorthand(Scene& scene) {
   const std::string hub = scene.hub.fixed ? "" : "hub";
   if (!hub.empty()) {
     BodyScene body;
-    body.name = hub, body.structure = "rigid";
+    body.name = hub, body.structure = "rigid", body.modes = 0;
     body.rigid = RigidScene{.mass = scene.hub.mass, .inertia = scene.hub.inertia, .size = scene.hub.size};
     scene.bodies.push_back(std::move(body));
     JointScene flight;
@@ -412,6 +437,7 @@ void write_out_shorthand(Scene& scene) {
     joint.a = {.body = hub, .marker = {}, .point = h.hinge.point, .x = h.hinge.stowed};
     joint.a.z = h.hinge.stowed.cross(h.hinge.outward).normalized();
     joint.b.body = h.body;
+    look_up(scene, joint.b);
     joint.mechanism = h.hinge.mechanism, joint.law = h.law;
     joint.start = {h.start_angle}, joint.start_rate = {h.start_rate};
     joint.loads = h.loads;
@@ -428,16 +454,19 @@ Scene read_whole_scene(TableReader& table, Reading& reading) {
   scene.duration = table.number("duration", scene.duration);
   scene.output_step = table.number("output_step", scene.output_step);
   scene.vtu_step = table.number("vtu_step", scene.vtu_step);
-  const bool in_tree = beyond_a_hub(table);
   if (auto accuracy = table.table("accuracy")) read_accuracy(*accuracy, scene);
   if (auto integrator = table.table("integrator")) read_integrator(*integrator, scene);
   if (auto orbit = table.table("orbit")) scene.orbit = read_orbit(*orbit);
   for (TableReader& body : table.tables("bodies")) {
-    scene.bodies.push_back(read_body_entry(body, in_tree, reading));
+    scene.bodies.push_back(read_body_entry(body, reading));
     warn_of_rigid(scene.bodies.back(), body.path("modes"), body.has("modes"), reading.warnings);
   }
+  const bool in_tree = beyond_a_hub(table, scene.bodies);
+  for (BodyScene& body : scene.bodies)
+    if (in_tree && body.stiffening.empty() && !body.rigid) body.stiffening = "auto";
   if (!in_tree || table.has("hub") || table.has("hinges")) read_around_hub(table, scene, reading);
   if (in_tree) read_tree(table, scene);
+  take_hinges(scene);
   table.reject_unknown();
   return scene;
 }

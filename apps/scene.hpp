@@ -3,6 +3,7 @@
 #include "apps/tree_scene.hpp"
 #include "dynamics/hinge.hpp"
 #include "fem/solid_boom.hpp"
+#include "reduction/basis.hpp"
 #include "reduction/reduced_body.hpp"
 
 #include <Eigen/Core>
@@ -36,6 +37,7 @@ struct BodyScene {
   bool modes_given = false;                // by the file
   bool modes_auto = false;                 // modes = "auto": chosen from the accuracy wanted
   std::string directions = "hinge-plane";  // modes that count: "hinge-plane" (bending along y) or "all"
+  BasisOptions basis;                      // its names and places; modes, plane and backend are those of the body
   BeamGeometry geometry;
   SolidOptions solid;            // [solid], how structure = "solid" is meshed
   DampingRule damping;           // none by default
@@ -48,6 +50,7 @@ struct BodyScene {
   std::filesystem::path reduced_file;          // where `reduced` is from, absolute
   bool is_boom() const { return !rigid && !reduced; }
   bool is_elastic() const;  // has it coordinates, as far as that is known before it is made?
+  bool root_moves() const;  // in its own frame: the root is then a marker, not a point of the frame
 };
 
 /// A rigid hub. Inertia about its mass centre, which is the origin of its BRF.

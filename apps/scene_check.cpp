@@ -184,7 +184,7 @@ void check_hinge_bodies(Faults& faults, const Scene& scene) {
   }
 }
 
-// Each body hangs on a hinge by its root. Silent after a fault in what a hinge says of its body, which would be
+// Each body hangs on a hinge. Silent after a fault in what a hinge says of its body, which would be
 // repeated here.
 void check_connections(Faults& faults, const Scene& scene) {
   if (!body_names_known(faults, scene)) return;
@@ -200,10 +200,6 @@ void check_connections(Faults& faults, const Scene& scene) {
     const std::string path = fmt::format("bodies[{}]", i);
     if (!hinged.contains(body.name)) {
       faults.add(path, fmt::format("\"{0}\" has no hinge; give [[hinges]] with body = \"{0}\"", body.name));
-    }
-    if (body.clamp != "root") {
-      faults.add(path + ".clamp",
-                 fmt::format("is {}; on a hinge it must be \"root\"", toml_reader::quoted(body.clamp)));
     }
   }
 }
@@ -237,6 +233,10 @@ void check_scene(const Scene& scene, Faults& faults) {
   for (size_t i = 0; i < scene.bodies.size(); ++i) check_body(scene.bodies[i], fmt::format("bodies[{}]", i), faults);
   for (size_t i = 0; i < scene.hinges.size(); ++i) check_hinge(faults, fmt::format("hinges[{}]", i), scene.hinges[i]);
   check_body_names(faults, scene);
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (const BasisOptions& basis = scene.bodies[i].basis; basis.name == "hinge" && basis.hinge_stiffness.empty())
+      faults.add(fmt::format("bodies[{}].hinge_stiffness", i),
+                 "is missing: no hinge carries the body whose stiffness could be taken; give it [N m/rad]");
   check_accuracy(faults, scene);
   scene.is_tree ? check_tree(scene, faults) : check_connections(faults, scene);
 }

@@ -70,6 +70,7 @@ namespace flexboom {
 
 struct Scene;
 struct BodyScene;
+struct PlaceScene;
 
 /// Everything that can be said of the values themselves, under the key paths of a scene file or (for a body with an
 /// empty path) of a body file.
@@ -82,6 +83,11 @@ void check_body(const BodyScene&, const std::string& path, toml_reader::Faults&)
 /// Joints, springs, loads, wheels and gravity: reading (apps/tree_scene_reader.cpp) and checking.
 void read_tree(toml_reader::TableReader&, Scene&);
 void check_tree(const Scene&, toml_reader::Faults&);
+
+/// Decks write names in capitals: a marker that is not there as written is the one that differs by case alone. A place
+/// without marker or point on a body whose root moves in its frame is the root. A hub that is fixed is the inertial
+/// frame.
+void look_up(const Scene&, PlaceScene&);
 
 /// What formulation = "multipliers" cannot do.
 void check_multipliers(const Scene&, toml_reader::Faults&);

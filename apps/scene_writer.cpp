@@ -84,6 +84,18 @@ void write_body(Writer& out, const BodyScene& body) {
   out.key("clamp", body.clamp);
   out.raw("modes", body.modes_auto ? "\"auto\"" : toml(body.modes));
   out.key("directions", body.directions);
+  const BasisOptions& basis = body.basis;
+  out.key("basis", basis.name);
+  if (basis.name == "craig-bampton") {
+    out.key("interfaces", basis.interfaces);
+    out.key("reference", basis.reference);
+    out.key("orthonormal", basis.orthonormal);
+  }
+  if (basis.name == "hinge") {
+    out.key("hinge_stiffness", basis.hinge_stiffness, "N m/rad");
+    out.key("hinge_axis", basis.hinge_axis);
+  }
+  out.key("corrections", basis.corrections);
   out.key("theory", scene_keys::theories[static_cast<size_t>(boom.theory)]);
   out.raw("shear", boom.shear.name == "value" ? toml(boom.shear.value) : toml(boom.shear.name));
   out.key("rotary_inertia", boom.rotary_inertia);

@@ -107,7 +107,7 @@ FlightState end_of(const std::vector<PreparedBody>& bodies, double time, const V
   end.time = time;
   end.y = y;
   end.largest = largest;
-  for (const PreparedBody& p : bodies) end.modes[p.body.name] = p.body.n();
+  for (const PreparedBody& p : bodies) end.modes[p.body.name] = p.modes;
   return end;
 }
 

@@ -347,6 +347,17 @@ bool TableReader::numbers(const Value& array, std::string_view key, double* out)
   return true;
 }
 
+std::vector<double> TableReader::numbers(std::string_view key) {
+  const Value* value = find(key);
+  if (!value) return {};
+  if (is_number(*value)) return {value->number};
+  std::vector<double> result;
+  for (const Value& item : value->items) result.push_back(item.number);
+  if (value->kind != Kind::array || !std::ranges::all_of(value->items, is_number))
+    fault(key, "must be a number or an array of numbers");
+  return result;
+}
+
 Eigen::Vector3d TableReader::vector(std::string_view key, const std::optional<Eigen::Vector3d>& otherwise) {
   if (otherwise && !has(key)) return *otherwise;
   const Eigen::Vector3d wrong = Eigen::Vector3d::Constant(nan);

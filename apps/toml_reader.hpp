@@ -115,6 +115,8 @@ class TableReader {
   bool boolean(std::string_view key, std::optional<bool> otherwise = {});
   std::string text(std::string_view key, const std::optional<std::string>& otherwise = {});
   std::vector<std::string> texts(std::string_view key, const std::vector<std::string>& otherwise);
+  /// One number, or an array of them; absent: none.
+  std::vector<double> numbers(std::string_view key);
   Eigen::Vector3d vector(std::string_view key, const std::optional<Eigen::Vector3d>& otherwise = {});
 
   /// Three rows of three, or the three diagonal values.

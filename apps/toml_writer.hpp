@@ -30,9 +30,10 @@ inline std::string toml(const Eigen::Matrix3d& m) {
   const auto row = [&m](int i) { return toml(Eigen::Vector3d(m.row(i))); };
   return fmt::format("[\n  {},\n  {},\n  {},\n]", row(0), row(1), row(2));
 }
-inline std::string toml(const std::vector<std::string>& values) {
+template <class T>
+std::string toml(const std::vector<T>& values) {
   std::string text = "[";
-  for (const std::string& value : values) text += (text.size() > 1 ? ", " : "") + toml(value);
+  for (const T& value : values) text += (text.size() > 1 ? ", " : "") + toml(value);
   return text + "]";
 }
 

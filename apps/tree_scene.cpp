@@ -51,6 +51,12 @@ bool BodyScene::is_elastic() const {
   return !rigid && structure != "rigid" && (modes > 0 || modes_auto);
 }
 
+bool BodyScene::root_moves() const {
+  if (reduced) return reduced->frame == "mean-axis";
+  if (!is_elastic()) return false;
+  return basis.name == "mean-axis" || (basis.name == "craig-bampton" ? basis.reference != "root" : clamp != "root");
+}
+
 std::vector<std::string> marker_names(const BodyScene& body) {
   if (body.rigid) return {};
   std::vector<std::string> names;

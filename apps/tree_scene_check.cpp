@@ -86,7 +86,12 @@ class TreeCheck {
       return;
     }
     const BodyScene* body = body_named(path + ".body", p.body);
-    if (!body || p.marker.empty()) return;
+    if (!body) return;
+    if (p.marker.empty() && body->root_moves() && body->is_elastic())
+      faults_.add(path + ".point",
+                  "is a point of the frame, which no material of this body follows: its basis moves the root, too; "
+                  "give a marker");
+    if (p.marker.empty()) return;
     const std::vector<std::string> names = marker_names(*body);
     if (names.empty()) return faults_.add(path + ".marker", fmt::format("a rigid body has none; give a point"));
     check_name_among(faults_, path + ".marker", p.marker, std::vector<std::string_view>(names.begin(), names.end()));

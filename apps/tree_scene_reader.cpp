@@ -27,21 +27,6 @@ const Value* value_at(TableReader& table, std::string_view key) {
 
 bool is_number(const Value& v) { return v.kind == Value::Kind::number || v.kind == Value::Kind::integer; }
 
-/// Numbers of a key: one, or an array of them. Absent: empty.
-std::vector<double> numbers(TableReader& table, std::string_view key) {
-  const Value* value = value_at(table, key);
-  if (!value) return {};
-  if (is_number(*value)) return {value->number};
-  std::vector<double> result;
-  bool good = value->kind == Value::Kind::array;
-  for (const Value& item : value->items) {
-    good = good && is_number(item);
-    result.push_back(item.number);
-  }
-  if (!good) table.fault(key, "must be a number or an array of numbers");
-  return result;
-}
-
 /// Without its start.
 Manoeuvre read_manoeuvre(TableReader& table) {
   Manoeuvre m;
@@ -63,8 +48,8 @@ CourseScene read_course_table(TableReader table) {
   TimeTable t;
   t.interpolation = table.text("interpolation", t.interpolation);
   t.outside = table.text("outside", t.outside);
-  t.time = numbers(table, "time");
-  t.value = numbers(table, "value");
+  t.time = table.numbers("time");
+  t.value = table.numbers("value");
   for (const char* key : {"time", "value"})
     if (!table.has(key))
       table.fault(key,
@@ -165,9 +150,9 @@ JointScene read_joint(TableReader table) {
   joint.law = read_law(table);
   joint.drive = read_course(table, "drive");
   joint.motion = read_courses(table, "motion");
-  joint.start = numbers(table, "start");
-  joint.start_rate = numbers(table, "start_rate");
-  if (const std::vector<double> attitude = numbers(table, "start_attitude"); attitude.size() == 4) {
+  joint.start = table.numbers("start");
+  joint.start_rate = table.numbers("start_rate");
+  if (const std::vector<double> attitude = table.numbers("start_attitude"); attitude.size() == 4) {
     joint.start_attitude = Eigen::Map<const Eigen::Vector4d>(attitude.data());
   } else if (table.has("start_attitude")) {
     table.fault("start_attitude", "must be a unit quaternion [w, x, y, z], from the axes of b to those of a");
@@ -231,19 +216,19 @@ bool same_but_case(std::string_view a, std::string_view b) {
       a, b, {}, [](unsigned char c) { return std::tolower(c); }, [](unsigned char c) { return std::tolower(c); });
 }
 
-/// Decks write names in capitals: a marker that is not there as written is the one that differs by case alone. A hub
-/// that is fixed is the inertial frame.
+}  // namespace
+
 void look_up(const Scene& scene, PlaceScene& place) {
   if (scene.hub.fixed && place.body == "hub") place.body.clear();
   const auto body = std::ranges::find(scene.bodies, place.body, &BodyScene::name);
-  if (place.marker.empty() || body == scene.bodies.end()) return;
+  if (body == scene.bodies.end()) return;
+  if (place.marker.empty() && place.point.isZero(0) && body->is_boom() && body->root_moves()) place.marker = "root";
+  if (place.marker.empty()) return;
   const std::vector<std::string> names = marker_names(*body);
   if (std::ranges::find(names, place.marker) != names.end()) return;
   const auto like = [&](const std::string& name) { return same_but_case(name, place.marker); };
   if (std::ranges::count_if(names, like) == 1) place.marker = *std::ranges::find_if(names, like);
 }
-
-}  // namespace
 
 void read_tree(TableReader& table, Scene& scene) {
   scene.is_tree = true;

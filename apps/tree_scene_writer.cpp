@@ -17,12 +17,6 @@ std::string place(const PlaceScene& p) {
                      toml(p.x), toml(p.z));
 }
 
-std::string numbers(const std::vector<double>& values) {
-  std::string text = "[";
-  for (const double v : values) text += (text.size() > 1 ? ", " : "") + toml(v);
-  return text + "]";
-}
-
 std::string course(const CourseScene& c) {
   if (c.manoeuvre)
     return fmt::format("{{ profile = {}, angle = {}, peak_rate = {}, peak_acceleration = {}, start = {} }}",
@@ -30,7 +24,7 @@ std::string course(const CourseScene& c) {
                        toml(c.manoeuvre->peak_acceleration), toml(c.manoeuvre->start));
   if (c.table)
     return fmt::format("{{ interpolation = {}, outside = {}, time = {}, value = {} }}", toml(c.table->interpolation),
-                       toml(c.table->outside), numbers(c.table->time), numbers(c.table->value));
+                       toml(c.table->outside), toml(c.table->time), toml(c.table->value));
   return toml(c.given() ? c.expression : std::string("0"));
 }
 
@@ -57,11 +51,11 @@ void write_joint(Writer& out, const JointScene& j) {
   if (j.drive.given()) out.raw("drive", course(j.drive));
   if (j.motion.size() == 1) out.raw("motion", course(j.motion[0]));
   if (j.motion.size() == 2) out.raw("motion", fmt::format("[{}, {}]", course(j.motion[0]), course(j.motion[1])));
-  if (!j.start.empty()) out.raw("start", numbers(j.start));
-  if (!j.start_rate.empty()) out.raw("start_rate", numbers(j.start_rate));
+  if (!j.start.empty()) out.raw("start", toml(j.start));
+  if (!j.start_rate.empty()) out.raw("start_rate", toml(j.start_rate));
   if (type.turns) {
     const Eigen::Vector4d& a = j.start_attitude;
-    out.raw("start_attitude", numbers({a[0], a[1], a[2], a[3]}));
+    out.raw("start_attitude", toml(std::vector{a[0], a[1], a[2], a[3]}));
     out.key("start_omega", j.start_omega, "rad/s");
   }
   if (type.floats) {

@@ -119,8 +119,12 @@ ModalBasis craig_bampton(const Mesh& mesh, const Assembly& assembly, std::vector
   const StaticSolver solver = static_solver(plan.held, assembly, left, b);
   const MatrixXd Psi_c = left.expanded(solver.displaced(MatrixXd::Identity(std::ssize(b), std::ssize(b))));
 
+  const int modes = options.modes.num_modes;
   ModalBasis normal;
-  if (options.modes.num_modes > 0) normal = clamped_modes(plan.fixed, assembly, plan.clamp, options.modes, threads);
+  if (modes > 0 && options.kinds.empty())
+    normal = clamped_modes(plan.fixed, assembly, plan.clamp, options.modes, threads);
+  else if (modes > 0)
+    normal = clamped_modes_of_kind(plan.fixed, assembly, plan.clamp, modes, options.kinds, options.modes);
   ModalBasis basis = joined(plan, Psi_c, normal);
   basis.unknowns = left.count;
   basis.rigid_freedoms = rigid_freedoms(plan.held, assembly.dofs, plan.clamp);

@@ -12,7 +12,8 @@ struct CraigBamptonOptions {
   EigenOptions modes;  // of the fixed-interface normal modes; num_modes = 0: static condensation
   std::string
       reference;  // interface that carries the BRF: it has no coordinates and the body flies; empty: frame "free"
-  bool orthonormal = false;  // the modes of the reduced body as coordinates: Me and Ke are diagonal
+  bool orthonormal = false;          // the modes of the reduced body as coordinates: Me and Ke are diagonal
+  std::vector<ModeKind> kinds = {};  // of the normal modes; empty: all
 };
 
 /// Craig-Bampton basis (Craig, Bampton, AIAA Journal 6, 1968): the static shapes Psi_c of a unit motion of each kept

@@ -9,6 +9,7 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -118,6 +119,28 @@ struct Reduced {
   SparseMatrix K, M;
 };
 
+/// Adds the groups that the solver could not see: the assembled K of a slender body leaves more noise between double
+/// frequencies than the strain energies of their modes do. `Phi`: M-orthonormal, over all freedoms.
+EigenSummary with_equal_energies(const ModalModel& model, const MatrixXd& Phi, const VectorXd& lambda,
+                                 EigenSummary summary, int threads) {
+  constexpr double near = 1e-3, equal = 1e-8;                       // of omega^2
+  std::vector<char> joined(static_cast<size_t>(lambda.size()), 0);  // with the one before
+  for (const std::vector<int>& group : summary.pairs)
+    for (size_t i = 1; i < group.size(); ++i) joined[static_cast<size_t>(group[i])] = 1;
+  for (int i = 1; i < lambda.size(); ++i) {
+    if (joined[static_cast<size_t>(i)] || lambda(i) - lambda(i - 1) > near * lambda(i)) continue;
+    const VectorXd energy = strain_energies(model.mesh, model.dofs, Phi.middleCols(i - 1, 2), threads);
+    joined[static_cast<size_t>(i)] = std::abs(energy(1) - energy(0)) <= equal * energy(1);
+  }
+  summary.pairs.clear();
+  for (int i = 1; i < lambda.size(); ++i) {
+    if (!joined[static_cast<size_t>(i)]) continue;
+    if (!joined[static_cast<size_t>(i) - 1]) summary.pairs.push_back({i - 1});
+    summary.pairs.back().push_back(i);
+  }
+  return summary;
+}
+
 ModalBasis modes_of(const ModalModel& model, const Clamp& clamp, const Reduced& reduced, const EigenOptions& options,
                     int threads) {
   const int rigid = rigid_freedoms(model.mesh, model.dofs, clamp);
@@ -130,8 +153,9 @@ ModalBasis modes_of(const ModalModel& model, const Clamp& clamp, const Reduced& 
   const auto masses_of = [&](const MatrixXd& Phi) {
     return modal_masses(reduced.M, Phi(reduced.unknowns.free_dofs(), Eigen::all));
   };
-  ModalBasis basis = finished(model, reduced.unknowns.expanded(pairs.Phi), masses_of, pairs.summary, options.num_modes,
-                              rigid, threads);
+  MatrixXd Phi = reduced.unknowns.expanded(pairs.Phi);
+  const EigenSummary summary = with_equal_energies(model, Phi, pairs.lambda, pairs.summary, threads);
+  ModalBasis basis = finished(model, std::move(Phi), masses_of, summary, options.num_modes, rigid, threads);
   basis.unknowns = count;
   basis.factor = pairs.factor;
   set_clamped_interface(basis, model.mesh, clamp);
@@ -225,9 +249,8 @@ ModalBasis clamped_modes_releasing(const Mesh& mesh, Assembly& assembly, const C
   return modes_of(model, clamp, reduced, options, threads);
 }
 
-ModalBasis clamped_modes_of_kind(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, int count,
-                                 const std::vector<ModeKind>& kinds, EigenOptions options) {
-  const int all = unknowns(mesh, assembly.dofs, clamp).count;
+ModalBasis modes_of_kind(const std::function<ModalBasis(const EigenOptions&)>& solve, int all, int count,
+                         const std::vector<ModeKind>& kinds, EigenOptions options) {
   require(count >= 1 && count <= all,
           "modes: " + std::to_string(count) + " asked of a body with " + std::to_string(all) + " unknowns");
   // A first guess of how many modes hold enough of one kind: bending comes in two planes, other kinds are rare among
@@ -235,7 +258,7 @@ ModalBasis clamped_modes_of_kind(const Mesh& mesh, const Assembly& assembly, con
   options.num_modes = kinds.size() == 1 ? 2 * count + 2 : count + count / 4 + 2;
   for (;; options.num_modes *= 2) {
     options.num_modes = std::min(options.num_modes, all);
-    const ModalBasis basis = clamped_modes(mesh, assembly, clamp, options);
+    const ModalBasis basis = solve(options);
     std::vector<int> chosen;
     for (int i = 0; i < options.num_modes && std::ssize(chosen) < count; ++i) {
       const ModeKind kind = basis.kind[static_cast<size_t>(i)];
@@ -245,6 +268,12 @@ ModalBasis clamped_modes_of_kind(const Mesh& mesh, const Assembly& assembly, con
     require(options.num_modes < all, "modes: only " + std::to_string(chosen.size()) + " of the kinds asked for, " +
                                          std::to_string(count) + " wanted; refine the mesh or ask for fewer");
   }
+}
+
+ModalBasis clamped_modes_of_kind(const Mesh& mesh, const Assembly& assembly, const Clamp& clamp, int count,
+                                 const std::vector<ModeKind>& kinds, EigenOptions options) {
+  return modes_of_kind([&](const EigenOptions& o) { return clamped_modes(mesh, assembly, clamp, o); },
+                       unknowns(mesh, assembly.dofs, clamp).count, count, kinds, std::move(options));
 }
 
 }  // namespace flexboom

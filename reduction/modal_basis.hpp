@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -51,8 +52,12 @@ ModalBasis clamped_modes(const Mesh&, const Assembly&, const Clamp&, const Eigen
 /// afterwards).
 ModalBasis clamped_modes_releasing(const Mesh&, Assembly&, const Clamp&, const EigenOptions&, int threads = 1);
 
-/// The first `count` modes of the given kinds (all kinds when empty). Asks for more modes of the body until there are
-/// enough.
+/// The first `count` modes of the given kinds (all kinds when empty) among `all` that there are. `solve` is asked for
+/// more and more modes until there are enough. @throws InputError when there are not.
+ModalBasis modes_of_kind(const std::function<ModalBasis(const EigenOptions&)>& solve, int all, int count,
+                         const std::vector<ModeKind>& kinds, EigenOptions);
+
+/// Those of clamped_modes.
 ModalBasis clamped_modes_of_kind(const Mesh&, const Assembly&, const Clamp&, int count,
                                  const std::vector<ModeKind>& kinds, EigenOptions);
 

@@ -177,6 +177,10 @@ bool is_written_otherwise(const std::string& path) {
   return path == "bodies[0].attachments[0].position" || path.find(".a.x[") != std::string::npos;
 }
 
+std::string with_basis(const std::string& basis, const std::string& keys) {
+  return with(full_scene, "modes = \"auto\"", "modes = 3\nbasis = \"" + basis + "\"\n" + keys);
+}
+
 // The readers say what they look for, so a new key that is not written turns this red.
 TEST(Scene, EveryKeyThatIsReadIsWritten) {
   // Places and functions of time that are written in other ways.
@@ -197,8 +201,12 @@ TEST(Scene, EveryKeyThatIsReadIsWritten) {
            "restitution = 0.3 }", "stiffness = 5.0, damping = 0.1 }");
   std::set<std::string> known, written;
   for (const std::string& text :
-       {std::string(full_scene), std::string(full_tree), others, laws, tables, pads,
-        std::string(builtin_scene("sport-calibration")), std::string(builtin_scene("slider-crank"))}) {
+       {std::string(full_scene), with_basis("hinge", "hinge_stiffness = [0.3, 11.3]\nhinge_axis = [0, 0, 2]"),
+        with_basis("craig-bampton",
+                   "interfaces = [\"root\", \"head:distributing\"]\nreference = \"root\"\northonormal = true\n"
+                   "corrections = [\"tip.Fz\"]"),
+        std::string(full_tree), others, laws, tables, pads, std::string(builtin_scene("sport-calibration")),
+        std::string(builtin_scene("slider-crank"))}) {
     known.merge(keys_known(text, "."));
     std::set<std::string> given;
     std::map<std::string, std::string> before, after;
@@ -237,6 +245,58 @@ TEST(Scene, EveryKeyThatIsReadIsDocumented) {
     const std::string name = key.substr(key.rfind('.') + 1);
     EXPECT_TRUE(std::regex_search(text, std::regex("\\b" + name.substr(0, name.find('[')) + "\\b"))) << key;
   }
+}
+
+TEST(Basis, TakesTheStiffnessOfTheHingeThatCarriesTheBody) {
+  const std::string text = with(swing_on_joints, "modes = 1", "modes = 1\nbasis = \"hinge\"");
+  const std::string turned =
+      "b = { body = \"boom\", marker = \"root\", z = [0, 1, 0] }\nstop_stiffness = 5\nthreshold = 0.5";
+  const Scene scene = parse_scene(with(text, "b = { body = \"boom\", marker = \"root\" }", turned), "joints.toml");
+  EXPECT_EQ(scene.bodies[0].basis.hinge_stiffness, (std::vector<double>{1, 6}));
+  EXPECT_EQ(scene.bodies[0].basis.hinge_axis, Eigen::Vector3d(0, 1, 0));
+  expect_round_trip(scene);
+  const Scene hub = parse_scene(with(swing_on_hinge, "modes = 1", "modes = 1\nbasis = \"hinge\""), "hub.toml");
+  EXPECT_EQ(hub.bodies[0].basis.hinge_stiffness, std::vector<double>{1});
+  EXPECT_FALSE(hub.is_tree);
+}
+
+TEST(Basis, WhoseRootMovesIsCarriedAtItsRoot) {
+  const Scene hub = parse_scene(with(swing_on_hinge, "modes = 1", "modes = 1\nbasis = \"mean-axis\""), "hub.toml");
+  ASSERT_TRUE(hub.is_tree);
+  EXPECT_EQ(hub.joints.back().b.marker, "root");
+  expect_round_trip(hub);
+}
+
+TEST(Basis, ThatCannotServeIsAnErrorInWords) {
+  const auto fault = [](const std::string& text) {
+    try {
+      parse_scene(text, "scene.toml");
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const auto of = [&](const std::string& keys) {
+    return fault(with(swing_on_hinge, "modes = 1", "modes = 1\n" + keys));
+  };
+  EXPECT_NE(of("basis = \"clampd\"").find("bodies[0].basis: is \"clampd\"; did you mean \"clamped\"?"),
+            std::string::npos);
+  EXPECT_NE(of("interfaces = [\"tip\"]").find("interfaces: belongs to basis = \"craig-bampton\""), std::string::npos);
+  EXPECT_NE(of("hinge_stiffness = 3").find("belongs to basis = \"hinge\""), std::string::npos);
+  EXPECT_NE(of("basis = \"mean-axis\"\nstructure = \"eq14\"").find("needs finite elements"), std::string::npos);
+  EXPECT_NE(of("basis = \"craig-bampton\"\nreference = \"\"").find("the motion of the whole body"), std::string::npos);
+  EXPECT_NE(of("basis = \"craig-bampton\"\nreference = \"tp\"").find("did you mean \"tip\""), std::string::npos);
+  EXPECT_NE(of("basis = \"mean-axis\"\nclamp = \"tip\"").find("is not held by a clamp"), std::string::npos);
+  EXPECT_NE(of("basis = \"hinge\"\nhinge_stiffness = -1").find("zero or positive"), std::string::npos);
+  EXPECT_NE(of("corrections = [\"tip\"]").find("must be a node set and a direction"), std::string::npos);
+  EXPECT_NE(of("corrections = [\"tip.ux\"]").find("a load is Fx"), std::string::npos);
+  const std::string tree = with(swing_on_joints, "modes = 1", "modes = 1\nbasis = \"mean-axis\"");
+  EXPECT_NE(
+      fault(with(tree, "marker = \"root\" }", "point = [0.1, 0, 0] }")).find("which no material of this body follows"),
+      std::string::npos);
+  EXPECT_NE(
+      fault(with(with(tree, "mean-axis", "hinge"), "kind = \"hinge\"", "kind = \"slider\"")).find("no hinge carries"),
+      std::string::npos);
 }
 
 TEST(Scene, RandomNumbersSurviveTheRoundTripBitForBit) {
