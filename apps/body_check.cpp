@@ -1,3 +1,4 @@
+#include "apps/keys.hpp"
 #include "apps/scene.hpp"
 #include "apps/scene_checks.hpp"
 #include "apps/scene_keys.hpp"
@@ -131,9 +132,7 @@ void check_geometry(Faults& faults, const std::string& path, const BeamGeometry&
 
 void check_damping(Faults& faults, const std::string& path, const DampingRule& damping) {
   check_name_among(faults, join(path, "rule"), damping.name, scene_keys::damping_rules);
-  check_not_negative(faults, join(path, "value"), damping.value, "");
-  check_not_negative(faults, join(path, "alpha"), damping.alpha, " 1/s");
-  check_not_negative(faults, join(path, "beta"), damping.beta, " s");
+  check_keys(faults, path, damping, damping_keys);
   const bool by_value = damping.name == "modal" || damping.name == "loss-factor";
   const bool rayleigh = damping.name == "rayleigh";
   const auto refuse = [&](std::string_view key, double value, bool used) {
@@ -298,13 +297,6 @@ void check_basis(Faults& faults, const std::string& path, const BodyScene& body)
     }
 }
 
-void check_rigid(Faults& faults, const std::string& path, const RigidScene& body) {
-  check_positive(faults, join(path, "mass"), body.mass, " kg");
-  check_inertia(faults, join(path, "inertia"), body.inertia, true);
-  check_finite(faults, join(path, "centre"), body.centre);
-  for (int i = 0; i < 3; ++i) check_not_negative(faults, join(path, "size"), body.size(i), " m");
-}
-
 void check_stiffening(Faults& faults, const std::string& path, const BodyScene& body) {
   check_name_among(faults, join(path, "stiffening"), body.stiffening, scene_keys::stiffenings);
   if (body.stiffening != "on") return;
@@ -321,7 +313,7 @@ void check_stiffening(Faults& faults, const std::string& path, const BodyScene& 
 void check_body(const BodyScene& body, const std::string& path, Faults& faults) {
   check_name(faults, join(path, "name"), body.name);
   if (!body.stiffening.empty()) check_stiffening(faults, path, body);
-  if (body.rigid) return check_rigid(faults, path, *body.rigid);
+  if (body.rigid) return check_keys(faults, path, *body.rigid, rigid_keys);
   if (body.reduced && body.reduced->frame == "free")
     faults.add(join(path, "file"),
                "has coordinates that hold the motion of the whole body, which its joint has, too; reduce it with "

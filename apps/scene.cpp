@@ -1,5 +1,6 @@
 #include "apps/scene.hpp"
 
+#include "apps/keys.hpp"
 #include "apps/scene_keys.hpp"
 #include "apps/scene_law.hpp"
 #include "apps/toml_reader.hpp"
@@ -136,23 +137,8 @@ SolidOptions read_solid(TableReader& table) {
   SolidOptions solid;
   auto keys = table.table("solid");
   if (!keys) return solid;
-  solid.element = keys->text("element", solid.element);
-  solid.accuracy = keys->number("accuracy", solid.accuracy);
-  solid.order = keys->integer("order", solid.order);
-  solid.slit = keys->number("slit", solid.slit);
-  if (auto grading = keys->table("grading")) {
-    SolidGrading& g = solid.grading;
-    g.sectors = grading->integer("sectors", g.sectors);
-    g.rings = grading->integer("rings", g.rings);
-    g.long_elements = grading->integer("long_elements", g.long_elements);
-    g.end_layers = grading->integer("end_layers", g.end_layers);
-    g.first_layer = grading->number("first_layer", g.first_layer);
-    g.growth = grading->number("growth", g.growth);
-    g.corner_levels = grading->integer("corner_levels", g.corner_levels);
-    g.factor = grading->number("factor", g.factor);
-    grading->reject_unknown();
-  }
-  keys->reject_unknown();
+  if (auto grading = keys->table("grading")) read_keys(*grading, solid.grading, grading_keys);
+  read_keys(*keys, solid, solid_keys);
   return solid;
 }
 
@@ -161,11 +147,7 @@ DampingRule read_damping(TableReader& table, const DampingRule& otherwise) {
   if (!damping) return otherwise;
   DampingRule rule;
   rule.name = damping->text("rule");
-  const bool by_value = rule.name == "modal" || rule.name == "loss-factor";
-  rule.value = damping->number("value", by_value ? std::nullopt : std::optional(rule.value));
-  rule.alpha = damping->number("alpha", rule.alpha);
-  rule.beta = damping->number("beta", rule.beta);
-  damping->reject_unknown();
+  read_keys(*damping, rule, damping_keys);
   return rule;
 }
 
@@ -247,10 +229,8 @@ BodyScene read_rigid_body(TableReader& table, Reading& reading) {
   body.structure = "rigid";
   body.modes = 0;
   RigidScene rigid;
-  rigid.mass = table.number("mass");
-  rigid.inertia = read_inertia(table, "inertia", std::nullopt, reading);
-  rigid.centre = table.vector("centre", rigid.centre);
-  rigid.size = table.vector("size", rigid.size);
+  KeyReader reader(table, &reading.warnings);
+  rigid_keys(reader, rigid);
   body.rigid = rigid;
   table.reject_unknown(" (of a rigid body)");
   return body;
@@ -298,90 +278,37 @@ void warn_of_rigid(const BodyScene& body, const std::string& path, bool modes_gi
 
 // --- hinges ---
 
-double read_stiffness(TableReader& table, double threshold) {
+/// P1 stands for stiffness * threshold.
+void read_P1(TableReader& table, HingeMechanism& m) {
   const bool has_P1 = table.has("P1"), has_stiffness = table.has("stiffness");
   if (!has_P1 && !has_stiffness)
     table.fault("P1", "is missing; give P1 [N m] or stiffness = P1 / threshold [N m/rad], 0 for no spring");
   if (has_P1 && has_stiffness)
     table.fault("stiffness", "is given beside P1; stiffness = P1 / threshold, so give one of them");
-  if (!has_P1) return has_stiffness ? table.number("stiffness") : 0;
-  const double P1 = table.number("P1");
+  if (!has_P1) return;
+  const double P1 = table.number("P1"), threshold = m.threshold;
   if (!(std::isfinite(P1) && P1 >= 0)) table.fault("P1", fmt::format("is {} N m; it must be zero or positive", P1));
   if (threshold <= 0) table.fault("threshold", fmt::format("is {} rad; with P1 it must be positive", threshold));
-  return threshold > 0 && P1 >= 0 ? P1 / threshold : 0;
+  m.stiffness = threshold > 0 && P1 >= 0 ? P1 / threshold : 0;
 }
 
 HingeScene read_hinge(TableReader table) {
   HingeScene hinge;
-  HingeMechanism& mechanism = hinge.hinge.mechanism;
-  hinge.body = hinge.hinge.name = table.text("body");
-  hinge.hinge.point = table.vector("point");
-  hinge.hinge.stowed = unit_direction(table.vector("stowed"));
-  hinge.hinge.outward = normal_to(unit_direction(table.vector("outward")), hinge.hinge.stowed);
-  mechanism.threshold = table.number("threshold", mechanism.threshold);
-  mechanism.rest = table.number("rest", mechanism.rest);
-  mechanism.stiffness = read_stiffness(table, mechanism.threshold);
-  mechanism.damping = table.number("P2", mechanism.damping);
-  mechanism.stop_stiffness = table.number("P3", mechanism.stop_stiffness);
+  table.has("P1");  // a key that is known
   hinge.law = read_law(table);
-  hinge.start_angle = table.number("start_angle", mechanism.rest);
-  hinge.start_rate = table.number("start_rate", hinge.start_rate);
-  hinge.loads = table.boolean("loads", hinge.loads);
-  table.reject_unknown();
+  read_keys(table, hinge, hinge_keys);
+  read_P1(table, hinge.hinge.mechanism);
+  hinge.hinge.name = hinge.body;
+  hinge.hinge.stowed = unit_direction(hinge.hinge.stowed);
+  hinge.hinge.outward = normal_to(unit_direction(hinge.hinge.outward), hinge.hinge.stowed);
   return hinge;
 }
 
 // --- scene ---
 
-void read_accuracy(TableReader table, Scene& scene) {
-  scene.tolerance = table.number("tolerance", scene.tolerance);
-  scene.outputs = table.texts("outputs", scene.outputs);
-  scene.error_budget = table.boolean("budget", scene.error_budget);
-  table.reject_unknown();
-}
-
-void read_integrator(TableReader table, Scene& scene) {
-  scene.integrator = table.text("method", scene.integrator);
-  scene.formulation = table.text("formulation", scene.formulation);
-  scene.settle = table.number("settle", scene.settle);
-  scene.rescale_at_events = table.boolean("rescale_at_events", scene.rescale_at_events);
-  table.reject_unknown();
-}
-
-OrbitScene read_orbit(TableReader table) {
-  OrbitScene orbit;
-  orbit.altitude = table.number("altitude", orbit.altitude);
-  orbit.eccentricity = table.number("eccentricity", orbit.eccentricity);
-  orbit.inclination = table.number("inclination", orbit.inclination);
-  orbit.node = table.number("node", orbit.node);
-  orbit.perigee = table.number("perigee", orbit.perigee);
-  orbit.anomaly = table.number("anomaly", orbit.anomaly);
-  orbit.gravity = table.text("gravity", orbit.gravity);
-  orbit.J2 = table.boolean("J2", orbit.J2);
-  table.reject_unknown();
-  return orbit;
-}
-
-HubScene read_hub(TableReader table, Reading& reading) {
-  HubScene hub;
-  hub.fixed = table.boolean("fixed", hub.fixed);
-  // A hub that does not move needs no mass.
-  hub.mass = table.number("mass", hub.fixed ? std::optional(hub.mass) : std::nullopt);
-  hub.inertia = read_inertia(table, "inertia", hub.fixed ? std::optional(hub.inertia) : std::nullopt, reading);
-  hub.size = table.vector("size", hub.size);
-  table.reject_unknown();
-  return hub;
-}
-
-void read_initial(TableReader table, Scene& scene) {
-  scene.start_rate = table.vector("rate", scene.start_rate);
-  scene.start_velocity = table.vector("velocity", scene.start_velocity);
-  table.reject_unknown();
-}
-
 void read_around_hub(TableReader& table, Scene& scene, Reading& reading) {
-  if (auto hub = table.table("hub", true)) scene.hub = read_hub(*hub, reading);
-  if (auto initial = table.table("initial")) read_initial(*initial, scene);
+  if (auto hub = table.table("hub", true)) read_keys(*hub, scene.hub, hub_keys, &reading.warnings);
+  if (auto initial = table.table("initial")) read_keys(*initial, scene, initial_keys);
   for (TableReader& hinge : table.tables("hinges")) scene.hinges.push_back(read_hinge(hinge));
 }
 
@@ -450,13 +377,11 @@ void write_out_shorthand(Scene& scene) {
 Scene read_whole_scene(TableReader& table, Reading& reading) {
   Scene scene;
   read_format(table, scene_keys::scene_format);
-  scene.name = table.text("name");
-  scene.duration = table.number("duration", scene.duration);
-  scene.output_step = table.number("output_step", scene.output_step);
-  scene.vtu_step = table.number("vtu_step", scene.vtu_step);
-  if (auto accuracy = table.table("accuracy")) read_accuracy(*accuracy, scene);
-  if (auto integrator = table.table("integrator")) read_integrator(*integrator, scene);
-  if (auto orbit = table.table("orbit")) scene.orbit = read_orbit(*orbit);
+  KeyReader settings(table, &reading.warnings);
+  settings_keys(settings, scene);
+  if (auto accuracy = table.table("accuracy")) read_keys(*accuracy, scene, accuracy_keys);
+  if (auto integrator = table.table("integrator")) read_keys(*integrator, scene, integrator_keys);
+  if (auto orbit = table.table("orbit")) read_keys(*orbit, scene.orbit.emplace(), orbit_keys);
   for (TableReader& body : table.tables("bodies")) {
     scene.bodies.push_back(read_body_entry(body, reading));
     warn_of_rigid(scene.bodies.back(), body.path("modes"), body.has("modes"), reading.warnings);

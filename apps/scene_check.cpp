@@ -1,4 +1,5 @@
 #include "apps/deflection.hpp"
+#include "apps/keys.hpp"
 #include "apps/scene.hpp"
 #include "apps/scene_checks.hpp"
 #include "apps/scene_keys.hpp"
@@ -36,9 +37,6 @@ bool body_names_known(const Faults& faults, const Scene& scene) {
 }
 
 void check_times(Faults& faults, const Scene& scene) {
-  check_positive(faults, "duration", scene.duration, " s");
-  check_positive(faults, "output_step", scene.output_step, " s");
-  check_not_negative(faults, "vtu_step", scene.vtu_step, " s");
   const auto check_rows = [&](const char* key, double step) {
     if (step > 0 && scene.duration / step > max_rows) {
       faults.add(key, fmt::format("is {} s: {:.3g} rows in {} s; at most {:g} are written, so make it longer", step,
@@ -50,11 +48,6 @@ void check_times(Faults& faults, const Scene& scene) {
 }
 
 void check_accuracy(Faults& faults, const Scene& scene) {
-  constexpr double least = 1e-14;  // some steps of round-off
-  if (!(scene.tolerance >= least && scene.tolerance <= 0.1))
-    faults.add("accuracy.tolerance",
-               fmt::format("is {}; it must be {:g} or more, which is what double precision leaves, and at most 0.1",
-                           scene.tolerance, least));
   const std::vector<std::string> known = outputs_of(with_joints(scene));
   const std::vector<std::string_view> names(known.begin(), known.end());
   if (!body_names_known(faults, scene)) return;
@@ -71,7 +64,6 @@ void check_accuracy(Faults& faults, const Scene& scene) {
 }
 
 void check_integrator(Faults& faults, const Scene& scene) {
-  check_name_among(faults, "integrator.formulation", scene.formulation, scene_keys::formulations);
   const bool redundant = scene.formulation == "multipliers";
   std::vector<std::string_view> methods = {"auto"};
   if (redundant) methods.push_back("ida");
@@ -84,27 +76,13 @@ void check_integrator(Faults& faults, const Scene& scene) {
     faults.add("integrator.method",
                "is \"exponential\", which simulates no laws of joints; \"auto\", \"adams\", "
                "\"bdf\", \"dirk\" and \"erk\" do");
-  if (!(std::isfinite(scene.settle) && scene.settle < 1)) {
-    faults.add("integrator.settle",
-               fmt::format("is {}; it must be below 1 (0: never, negative: the tolerance)", scene.settle));
-  }
 }
 
 void check_hub(Faults& faults, const Scene& scene) {
-  const HubScene& hub = scene.hub;
-  for (int i = 0; i < 3; ++i) check_not_negative(faults, "hub.size", hub.size(i), " m");
-  check_finite(faults, "initial.rate", scene.start_rate);
-  check_finite(faults, "initial.velocity", scene.start_velocity);
-  if (!hub.fixed) {
-    if (!(std::isfinite(hub.mass) && hub.mass > 0))
-      faults.add("hub.mass", fmt::format("is {} kg; it must be positive, or hub.fixed = true", hub.mass));
-    check_positive(faults, "hub.mass", hub.mass, " kg");
-    check_inertia(faults, "hub.inertia", hub.inertia, false);
-    return;
-  }
+  check_keys(faults, "hub", scene.hub, hub_keys);
+  check_keys(faults, "initial", scene, initial_keys);
+  if (!scene.hub.fixed) return;
   if (scene.bodies.empty()) faults.add("hub.fixed", "is true and there is no body: nothing moves");
-  check_not_negative(faults, "hub.mass", hub.mass, " kg");
-  check_inertia(faults, "hub.inertia", hub.inertia, true);
   const auto at_rest = [&](const char* path, const Vector3d& v) {
     if (v.allFinite() && !v.isZero(0)) faults.add(path, "is not zero but hub.fixed is true; drop one of them");
   };
@@ -112,23 +90,7 @@ void check_hub(Faults& faults, const Scene& scene) {
   at_rest("initial.velocity", scene.start_velocity);
 }
 
-void check_orbit(Faults& faults, const OrbitScene& orbit) {
-  check_positive(faults, "orbit.altitude", orbit.altitude, " m");
-  if (!(orbit.eccentricity >= 0 && orbit.eccentricity < 1))
-    faults.add("orbit.eccentricity", fmt::format("is {}; it must lie in [0, 1)", orbit.eccentricity));
-  for (const auto& [key, angle] : {std::pair{"orbit.inclination", orbit.inclination},
-                                   {"orbit.node", orbit.node},
-                                   {"orbit.perigee", orbit.perigee},
-                                   {"orbit.anomaly", orbit.anomaly}})
-    if (!(std::abs(angle) <= 2 * std::numbers::pi))
-      faults.add(key, fmt::format("is {} rad; it must lie between -2 pi and 2 pi", angle));
-  if (orbit.gravity != "none" && orbit.gravity != "differential")
-    faults.add("orbit.gravity", fmt::format("is \"{}\"; there are \"none\" and \"differential\"", orbit.gravity));
-}
-
 void check_directions(Faults& faults, const std::string& path, const Hinge& hinge) {
-  check_unit(faults, join(path, "stowed"), hinge.stowed);
-  check_unit(faults, join(path, "outward"), hinge.outward);
   const double cosine = hinge.stowed.dot(hinge.outward);
   if (std::abs(cosine) > round_off && faults.clean(join(path, "stowed"))) {
     faults.add(join(path, "outward"),
@@ -138,19 +100,11 @@ void check_directions(Faults& faults, const std::string& path, const Hinge& hing
 }
 
 void check_hinge(Faults& faults, const std::string& path, const HingeScene& hinge) {
-  const HingeMechanism& mechanism = hinge.hinge.mechanism;
-  check_finite(faults, join(path, "point"), hinge.hinge.point);
+  check_keys(faults, path, hinge, hinge_keys);
   check_directions(faults, path, hinge.hinge);
-  check_not_negative(faults, join(path, "stiffness"), mechanism.stiffness, " N m/rad");
-  check_not_negative(faults, join(path, "P2"), mechanism.damping, " N m s/rad");
-  check_not_negative(faults, join(path, "P3"), mechanism.stop_stiffness, " N m/rad");
-  check_finite(faults, join(path, "rest"), mechanism.rest);
-  check_finite(faults, join(path, "threshold"), mechanism.threshold);
   Joint with_law;
-  with_law.mechanism = mechanism, with_law.law = hinge.law;
+  with_law.mechanism = hinge.hinge.mechanism, with_law.law = hinge.law;
   check_law(faults, path, with_law, hinge.start_angle);
-  check_start(faults, join(path, "start_angle"), hinge.start_angle, " rad");
-  check_start(faults, join(path, "start_rate"), hinge.start_rate, " rad/s");
 }
 
 void check_body_names(Faults& faults, const Scene& scene) {
@@ -216,11 +170,13 @@ void check_shorthand(const Scene& scene, Faults& faults) {
 }
 
 void check_scene(const Scene& scene, Faults& faults) {
-  check_name(faults, "name", scene.name);  // the results folder is called so
+  check_keys(faults, "", scene, settings_keys);
+  check_keys(faults, "accuracy", scene, accuracy_keys);
+  check_keys(faults, "integrator", scene, integrator_keys);
   check_times(faults, scene);
   check_integrator(faults, scene);
   if (!scene.is_tree) check_hub(faults, scene);
-  if (scene.orbit) check_orbit(faults, *scene.orbit);
+  if (scene.orbit) check_keys(faults, "orbit", *scene.orbit, orbit_keys);
   const bool in_field = scene.orbit && scene.orbit->gravity != "none";
   if (in_field && scene.hub.fixed)
     faults.add("orbit.gravity", "acts on bodies that fly, but hub.fixed is true; drop one of them");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "apps/toml_reader.hpp"
+#include "apps/tree_scene.hpp"
 #include "fem/section.hpp"
 
 #include <array>
@@ -27,6 +28,7 @@ inline constexpr std::array<std::string_view, 4> damping_rules = {"none", "modal
 inline constexpr std::array<std::string_view, 2> formulations = {"relative", "multipliers"};
 inline constexpr std::array<std::string_view, 3> stiffenings = {"auto", "on", "off"};
 inline constexpr std::array<std::string_view, 2> load_axes = {"body", "inertial"};
+inline constexpr std::array<std::string_view, 2> orbit_gravities = {"none", "differential"};
 inline constexpr std::string_view ground = "ground";  // the inertial frame as a body
 
 /// A dimension of a cross-section [m, m^2, m^4, -].
@@ -70,7 +72,6 @@ namespace flexboom {
 
 struct Scene;
 struct BodyScene;
-struct PlaceScene;
 
 /// Everything that can be said of the values themselves, under the key paths of a scene file or (for a body with an
 /// empty path) of a body file.
@@ -97,6 +98,12 @@ void warn_of_oddities(const Scene&, std::vector<std::string>& warnings);
 
 /// Paths of every key that the readers of a scene look for, "bodies[].name".
 std::set<std::string> keys_known(const std::string& scene, const std::filesystem::path& folder);
+
+/// A place, functions of time: one, one per freedom, one per axis.
+PlaceScene read_place(toml_reader::TableReader&, std::string_view key);
+CourseScene read_course(toml_reader::TableReader&, std::string_view key);
+std::vector<CourseScene> read_courses(toml_reader::TableReader&, std::string_view key);
+std::array<CourseScene, 3> read_three_courses(toml_reader::TableReader&, std::string_view key);
 
 /// Markers that a place on the body may name.
 std::vector<std::string> marker_names(const BodyScene&);

@@ -1,3 +1,4 @@
+#include "apps/keys.hpp"
 #include "apps/scene.hpp"
 #include "apps/scene_keys.hpp"
 #include "apps/toml_writer.hpp"
@@ -45,34 +46,12 @@ std::string inline_damping(const DampingRule& damping) {
                      toml(damping.alpha), toml(damping.beta));
 }
 
-void write_solid(Writer& out, const SolidOptions& solid) {
-  out.table("[bodies.solid]");
-  out.key("element", solid.element);
-  out.key("accuracy", solid.accuracy);
-  out.key("order", solid.order);
-  out.key("slit", solid.slit, "m");
-  const SolidGrading& g = solid.grading;
-  out.table("[bodies.solid.grading]");
-  out.key("sectors", g.sectors);
-  out.key("rings", g.rings);
-  out.key("long_elements", g.long_elements);
-  out.key("end_layers", g.end_layers);
-  out.key("first_layer", g.first_layer);
-  out.key("growth", g.growth);
-  out.key("corner_levels", g.corner_levels);
-  out.key("factor", g.factor);
-}
-
 void write_body(Writer& out, const BodyScene& body) {
   const BeamGeometry& boom = body.geometry;
   out.table("[[bodies]]");
   out.key("name", body.name);
   if (body.rigid) {
-    out.key("mass", body.rigid->mass, "kg");
-    out.key("inertia", body.rigid->inertia, "kg m^2, about its mass centre");
-    out.key("centre", body.rigid->centre, "m");
-    out.key("size", body.rigid->size, "m");
-    return;
+    return write_keys(out, "", *body.rigid, rigid_keys);
   }
   if (!body.stiffening.empty()) out.key("stiffening", body.stiffening);
   if (body.reduced) {
@@ -102,57 +81,18 @@ void write_body(Writer& out, const BodyScene& body) {
   out.key("order", boom.order);
   out.key("backend", body.backend);
   out.raw("damping", inline_damping(body.damping));
-  write_solid(out, body.solid);
+  write_keys(out, "[bodies.solid]", body.solid, solid_keys);
+  write_keys(out, "[bodies.solid.grading]", body.solid.grading, grading_keys);
   for (const BeamSegment& segment : boom.segments) write_segment(out, segment);
   for (const RigidAttachment& attachment : boom.attachments) write_attachment(out, attachment);
 }
 
-void write_hinge(Writer& out, const HingeScene& scene) {
-  const Hinge& hinge = scene.hinge;
-  const HingeMechanism& mechanism = hinge.mechanism;
-  out.table("[[hinges]]");
-  out.key("body", scene.body);
-  out.key("point", hinge.point, "m, hub axes");
-  out.key("stowed", hinge.stowed);
-  out.key("outward", hinge.outward);
-  out.key("stiffness", mechanism.stiffness, "N m/rad, P1 / threshold");
-  out.key("rest", mechanism.rest, "rad");
-  out.key("P2", mechanism.damping, "N m s/rad");
-  out.key("P3", mechanism.stop_stiffness, "N m/rad");
-  out.key("threshold", mechanism.threshold, "rad");
-  out.key("start_angle", scene.start_angle, "rad");
-  out.key("start_rate", scene.start_rate, "rad/s");
-  out.key("loads", scene.loads);
-}
-
-void write_orbit(Writer& out, const OrbitScene& orbit) {
-  out.table("[orbit]");
-  out.key("altitude", orbit.altitude, "m, of the perigee");
-  out.key("eccentricity", orbit.eccentricity);
-  out.key("inclination", orbit.inclination, "rad");
-  out.key("node", orbit.node, "rad");
-  out.key("perigee", orbit.perigee, "rad");
-  out.key("anomaly", orbit.anomaly, "rad");
-  out.key("gravity", orbit.gravity);
-  out.key("J2", orbit.J2);
-}
-
 void write_settings(Writer& out, const Scene& scene) {
   out.key("format", scene_keys::scene_format);
-  out.key("name", scene.name);
-  out.key("duration", scene.duration, "s");
-  out.key("output_step", scene.output_step, "s");
-  out.key("vtu_step", scene.vtu_step, "s; 0: no VTU files");
+  write_keys(out, "", scene, settings_keys);
   if (scene.is_tree) out.key("gravity", scene.gravity, "m/s^2");
-  out.table("[accuracy]");
-  out.key("tolerance", scene.tolerance);
-  out.key("outputs", scene.outputs, scene.outputs.empty() ? "all" : "");
-  out.key("budget", scene.error_budget);
-  out.table("[integrator]");
-  out.key("method", scene.integrator);
-  out.key("formulation", scene.formulation);
-  out.key("settle", scene.settle);
-  out.key("rescale_at_events", scene.rescale_at_events);
+  write_keys(out, "[accuracy]", scene, accuracy_keys);
+  write_keys(out, "[integrator]", scene, integrator_keys);
 }
 
 }  // namespace
@@ -166,22 +106,16 @@ std::string to_toml(const BodyScene& body) {
 std::string to_toml(const Scene& scene) {
   Writer out;
   write_settings(out, scene);
-  if (scene.orbit) write_orbit(out, *scene.orbit);
+  if (scene.orbit) write_keys(out, "[orbit]", *scene.orbit, orbit_keys);
   if (scene.is_tree) {
     for (const BodyScene& body : scene.bodies) write_body(out, body);
     write_tree(out, scene);
     return std::move(out).text();
   }
-  out.table("[hub]");
-  out.key("mass", scene.hub.mass, "kg");
-  out.key("inertia", scene.hub.inertia, "kg m^2");
-  out.key("fixed", scene.hub.fixed);
-  out.key("size", scene.hub.size, "m");
-  out.table("[initial]");
-  out.key("rate", scene.start_rate, "rad/s");
-  out.key("velocity", scene.start_velocity, "m/s");
+  write_keys(out, "[hub]", scene.hub, hub_keys);
+  write_keys(out, "[initial]", scene, initial_keys);
   for (const BodyScene& body : scene.bodies) write_body(out, body);
-  for (const HingeScene& hinge : scene.hinges) write_hinge(out, hinge);
+  for (const HingeScene& hinge : scene.hinges) write_keys(out, "[[hinges]]", hinge, hinge_keys);
   return std::move(out).text();
 }
 

@@ -26,6 +26,9 @@ inline std::string toml(std::string_view value) { return toml_reader::quoted(val
 inline std::string toml(const Eigen::Vector3d& v) {
   return fmt::format("[{}, {}, {}]", toml(v.x()), toml(v.y()), toml(v.z()));
 }
+inline std::string toml(const Eigen::Vector4d& v) {
+  return fmt::format("[{}, {}, {}, {}]", toml(v[0]), toml(v[1]), toml(v[2]), toml(v[3]));
+}
 inline std::string toml(const Eigen::Matrix3d& m) {
   const auto row = [&m](int i) { return toml(Eigen::Vector3d(m.row(i))); };
   return fmt::format("[\n  {},\n  {},\n  {},\n]", row(0), row(1), row(2));
@@ -46,7 +49,9 @@ class Writer {
     text_ += fmt::format("{} = {}{}{}\n", name, toml(value), *comment ? "  # " : "", comment);
   }
 
-  void raw(std::string_view name, const std::string& value) { text_ += fmt::format("{} = {}\n", name, value); }
+  void raw(std::string_view name, const std::string& value, std::string_view comment = "") {
+    text_ += fmt::format("{} = {}{}{}\n", name, value, comment.empty() ? "" : "  # ", comment);
+  }
 
   std::string text() && { return std::move(text_); }
 

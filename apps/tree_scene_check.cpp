@@ -1,5 +1,6 @@
 // Checks of [[joints]], [[springs]], [[loads]], [[wheels]] and [[turns]].
 
+#include "apps/keys.hpp"
 #include "apps/scene.hpp"
 #include "apps/scene_checks.hpp"
 #include "apps/scene_keys.hpp"
@@ -28,11 +29,17 @@ class TreeCheck {
       faults_.add("joints", "has no joint; each body hangs on one, free ones on a joint of kind \"free\"");
     check_finite(faults_, "gravity", scene_.gravity);
     check_names();
-    each("joints", scene_.joints, [this](const auto& path, const JointScene& j) { joint(path, j); });
-    each("springs", scene_.springs, [this](const auto& path, const SpringScene& s) { spring(path, s); });
-    each("loads", scene_.loads, [this](const auto& path, const LoadScene& l) { load(path, l); });
-    each("wheels", scene_.wheels, [this](const auto& path, const WheelScene& w) { wheel(path, w); });
-    each("turns", scene_.turns, [this](const auto& path, const TurnScene& t) { turn(path, t); });
+    each("joints", scene_.joints,
+         [this](const auto& path, const JointScene& j) { check_keys(faults_, path, j, joint_keys), joint(path, j); });
+    each("springs", scene_.springs, [this](const auto& path, const SpringScene& s) {
+      check_keys(faults_, path, s, spring_keys), spring(path, s);
+    });
+    each("loads", scene_.loads,
+         [this](const auto& path, const LoadScene& l) { check_keys(faults_, path, l, load_keys), load(path, l); });
+    each("wheels", scene_.wheels,
+         [this](const auto& path, const WheelScene& w) { check_keys(faults_, path, w, wheel_keys), wheel(path, w); });
+    each("turns", scene_.turns,
+         [this](const auto& path, const TurnScene& t) { check_keys(faults_, path, t, turn_keys), turn(path, t); });
     if (!scene_.turns.empty()) turning_body();
     if (faults_.clean("joints") && bodies_known()) topology();
   }
@@ -54,7 +61,6 @@ class TreeCheck {
     const auto unique = [this](const char* what, const auto& items) {
       std::set<std::string> taken = {"energy"};
       each(what, items, [&](const std::string& path, const auto& item) {
-        check_name(faults_, path + ".name", item.name);
         if (!taken.insert(item.name).second)
           faults_.add(path + ".name", fmt::format("{} is taken; choose another", toml_reader::quoted(item.name)));
       });
@@ -115,13 +121,10 @@ class TreeCheck {
       faults_.add(path + ".b", "has no body; a is the place nearer to the inertial frame, b is on a body");
     const HingeMechanism& m = j.mechanism;
     const auto mechanism = [&](const char* key, double value) {
-      check_not_negative(faults_, path + "." + key, value, "");
       if (value > 0 && !scalar)
         faults_.add(path + "." + key, fmt::format("a {} joint has none; hinges and sliders have", type.name));
     };
     mechanism("stiffness", m.stiffness), mechanism("damping", m.damping), mechanism("stop_stiffness", m.stop_stiffness);
-    check_finite(faults_, path + ".rest", m.rest);
-    check_finite(faults_, path + ".threshold", m.threshold);
     Joint with_law;
     with_law.kind = j.kind, with_law.mechanism = m, with_law.law = j.law;
     with_law.prescribed.resize(j.motion.size());
@@ -174,7 +177,6 @@ class TreeCheck {
     };
     scalars("start", j.start), scalars("start_rate", j.start_rate);
     const auto vector = [&](const char* key, const Eigen::Vector3d& v, bool has) {
-      check_finite(faults_, path + "." + key, v);
       if (!has && !v.isZero(0)) faults_.add(path + "." + key, fmt::format("a {} joint has none", type.name));
     };
     vector("start_omega", j.start_omega, type.turns);
@@ -190,9 +192,6 @@ class TreeCheck {
   void spring(const std::string& path, const SpringScene& s) {
     place(path + ".a", s.a);
     place(path + ".b", s.b);
-    check_not_negative(faults_, path + ".stiffness", s.stiffness, " N/m");
-    check_not_negative(faults_, path + ".free_length", s.free_length, " m");
-    check_not_negative(faults_, path + ".damping", s.damping, " N s/m");
   }
 
   void load(const std::string& path, const LoadScene& l) {
@@ -204,15 +203,10 @@ class TreeCheck {
 
   void wheel(const std::string& path, const WheelScene& w) {
     body_named(path + ".body", w.body);
-    check_unit(faults_, path + ".axis", w.axis);
-    check_positive(faults_, path + ".inertia", w.inertia, " kg m^2");
-    check_finite(faults_, path + ".spin", w.spin);
     course(path + ".torque", w.torque);
   }
 
   void turn(const std::string& path, const TurnScene& t) {
-    check_unit(faults_, path + ".axis", t.axis);
-    check_not_negative(faults_, path + ".pause", t.pause, " s");
     if (t.body != scene_.turns.front().body)
       faults_.add(path + ".body", fmt::format("is not {}, the body of the first turn; all turns are of one body",
                                               toml_reader::quoted(scene_.turns.front().body)));

@@ -1,5 +1,6 @@
 // [[joints]], [[springs]], [[loads]], [[wheels]], [[turns]]: from the file to a Scene.
 
+#include "apps/keys.hpp"
 #include "apps/scene.hpp"
 #include "apps/scene_keys.hpp"
 #include "apps/scene_law.hpp"
@@ -79,6 +80,8 @@ CourseScene read_course(TableReader& table, std::string_view key, const Value& i
   return course;
 }
 
+}  // namespace
+
 CourseScene read_course(TableReader& table, std::string_view key) {
   const Value* value = value_at(table, key);
   return value ? read_course(table, key, *value) : CourseScene{};
@@ -126,13 +129,7 @@ PlaceScene read_place(TableReader& parent, std::string_view key) {
   return place;
 }
 
-void read_mechanism(TableReader& table, HingeMechanism& m) {
-  m.stiffness = table.number("stiffness", m.stiffness);
-  m.rest = table.number("rest", m.rest);
-  m.damping = table.number("damping", m.damping);
-  m.stop_stiffness = table.number("stop_stiffness", m.stop_stiffness);
-  m.threshold = table.number("threshold", m.threshold);
-}
+namespace {
 
 JointScene read_joint(TableReader table) {
   JointScene joint;
@@ -143,72 +140,25 @@ JointScene read_joint(TableReader table) {
         "kind",
         "is missing; it must be one of \"fixed\", \"hinge\", \"slider\", \"universal\", \"spherical\", \"free\"");
   joint.kind = joint_types[table.choice("kind", kinds, static_cast<size_t>(joint.kind))].kind;
-  if (table.has("a")) joint.a = read_place(table, "a");
-  joint.b = read_place(table, "b");
-  joint.name = table.text("name", joint.b.body);
-  read_mechanism(table, joint.mechanism);
   joint.law = read_law(table);
-  joint.drive = read_course(table, "drive");
-  joint.motion = read_courses(table, "motion");
-  joint.start = table.numbers("start");
-  joint.start_rate = table.numbers("start_rate");
-  if (const std::vector<double> attitude = table.numbers("start_attitude"); attitude.size() == 4) {
-    joint.start_attitude = Eigen::Map<const Eigen::Vector4d>(attitude.data());
-  } else if (table.has("start_attitude")) {
-    table.fault("start_attitude", "must be a unit quaternion [w, x, y, z], from the axes of b to those of a");
-  }
-  joint.start_omega = table.vector("start_omega", joint.start_omega);
-  joint.start_position = table.vector("start_position", joint.start_position);
-  joint.start_velocity = table.vector("start_velocity", joint.start_velocity);
-  joint.loads = table.boolean("loads", joint.loads);
-  joint.closes_loop = table.boolean("closes_loop", joint.closes_loop);
-  table.reject_unknown();
+  read_keys(table, joint, joint_keys);
+  if (!table.has("name")) joint.name = joint.b.body;
   return joint;
-}
-
-SpringScene read_spring(TableReader table) {
-  SpringScene spring;
-  spring.name = table.text("name");
-  spring.a = read_place(table, "a");
-  spring.b = read_place(table, "b");
-  spring.stiffness = table.number("stiffness", spring.stiffness);
-  spring.free_length = table.number("free_length", spring.free_length);
-  spring.damping = table.number("damping", spring.damping);
-  table.reject_unknown();
-  return spring;
 }
 
 LoadScene read_load(TableReader table) {
   LoadScene load;
-  load.name = table.text("name");
-  load.at = read_place(table, "at");
   load.inertial_axes = table.choice("axes", scene_keys::load_axes, 0) == 1;
-  load.force = read_three_courses(table, "force");
-  load.torque = read_three_courses(table, "torque");
-  table.reject_unknown();
+  read_keys(table, load, load_keys);
   return load;
 }
 
-WheelScene read_wheel(TableReader table) {
-  WheelScene wheel;
-  wheel.name = table.text("name");
-  wheel.body = table.text("body");
-  wheel.axis = unit_direction(table.vector("axis", wheel.axis));
-  wheel.inertia = table.number("inertia");
-  wheel.spin = table.number("spin", wheel.spin);
-  wheel.torque = read_course(table, "torque");
-  table.reject_unknown();
-  return wheel;
-}
-
-TurnScene read_turn(TableReader table) {
-  TurnScene turn;
-  turn.body = table.text("body");
-  turn.axis = unit_direction(table.vector("axis", turn.axis));
-  turn.manoeuvre = read_manoeuvre(table);
-  turn.pause = table.number("pause", turn.pause);
-  table.reject_unknown();
-  return turn;
+/// Whole tables that need nothing else.
+template <class T>
+std::vector<T> read_all(TableReader& table, const char* name, Keys<T> keys) {
+  std::vector<T> all;
+  for (TableReader& one : table.tables(name)) read_keys(one, all.emplace_back(), keys);
+  return all;
 }
 
 bool same_but_case(std::string_view a, std::string_view b) {
@@ -234,10 +184,12 @@ void read_tree(TableReader& table, Scene& scene) {
   scene.is_tree = true;
   scene.gravity = table.vector("gravity", scene.gravity);
   for (TableReader& joint : table.tables("joints")) scene.joints.push_back(read_joint(joint));
-  for (TableReader& spring : table.tables("springs")) scene.springs.push_back(read_spring(spring));
   for (TableReader& load : table.tables("loads")) scene.loads.push_back(read_load(load));
-  for (TableReader& wheel : table.tables("wheels")) scene.wheels.push_back(read_wheel(wheel));
-  for (TableReader& turn : table.tables("turns")) scene.turns.push_back(read_turn(turn));
+  scene.springs = read_all<SpringScene>(table, "springs", spring_keys);
+  scene.wheels = read_all<WheelScene>(table, "wheels", wheel_keys);
+  scene.turns = read_all<TurnScene>(table, "turns", turn_keys);
+  for (WheelScene& wheel : scene.wheels) wheel.axis = unit_direction(wheel.axis);
+  for (TurnScene& turn : scene.turns) turn.axis = unit_direction(turn.axis);
   for (JointScene& j : scene.joints) look_up(scene, j.a), look_up(scene, j.b);
   for (SpringScene& s : scene.springs) look_up(scene, s.a), look_up(scene, s.b);
   for (LoadScene& l : scene.loads) look_up(scene, l.at);
