@@ -102,8 +102,8 @@ void add_states(const Multipliers& system, const MultibodyTrajectory& flight, st
 }
 
 /// Energies as the tree has them: the potential of gravity apart, mechanisms of loops among the elastic ones.
-TreeBalance balance_of(const Tree& tree, const MultibodyTrajectory& flight, size_t row, const VectorXd& y) {
-  TreeBalance b;
+Balance balance_of(const Tree& tree, const MultibodyTrajectory& flight, size_t row, const VectorXd& y) {
+  Balance b;
   b.kinetic = flight.balance[row].kinetic;
   b.potential = tree.balance(flight.time[row], y).potential;
   b.elastic = flight.balance[row].elastic - b.potential;
@@ -189,7 +189,7 @@ void set_flown(const FlownByMultipliers& f, size_t first, size_t last, const std
   });
   r.motion.warnings = warnings_of(f.scene, f.system.multibody(), f.flight, r.motion.stiffening_effect, stiffening);
   const MultibodyState& last_state = f.flight.states.back();
-  const TreeBalance at_end = balance_of(f.tree, f.flight, f.states.size() - 1, f.y(f.states.size() - 1));
+  const Balance at_end = balance_of(f.tree, f.flight, f.states.size() - 1, f.y(f.states.size() - 1));
   r.ledger = EnergyOfRun{at_end.kinetic, at_end.potential, at_end.work, last_state.ledger};
   r.motion.events = f.flight.events;
   r.motion.summary = summary_of(f.flight.summary);

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "apps/tree_scene.hpp"
-#include "dynamics/hinge.hpp"
+#include "dynamics/hub_with_booms.hpp"
 #include "fem/solid_boom.hpp"
 #include "reduction/basis.hpp"
 #include "reduction/reduced_body.hpp"

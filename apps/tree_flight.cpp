@@ -4,7 +4,6 @@
 
 #include "apps/scene_keys.hpp"
 #include "apps/scene_orbit.hpp"
-#include "dynamics/hub_flight.hpp"
 #include "fem/check.hpp"
 #include "fem/stopwatch.hpp"
 
@@ -263,12 +262,12 @@ namespace {
 
 bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty(); }
 
-EnergyOfRun ledger_of(const TreeBalance& b) { return {b.kinetic, b.potential, b.work, b.ledger}; }
+EnergyOfRun ledger_of(const Balance& b) { return {b.kinetic, b.potential, b.work, b.ledger}; }
 
-/// What results are made of; by_source: are energies known by their sources?
-void set_flown(const Scene& scene, TreeTrajectory flight, bool by_source, Run& r) {
+/// What results are made of.
+void set_flown(const Scene& scene, TreeTrajectory flight, Run& r) {
   r.outputs = output_table(scene, *r.tree, flight);
-  if (by_source && !flight.balance.empty()) r.ledger = ledger_of(flight.balance.back());
+  if (!flight.balance.empty()) r.ledger = ledger_of(flight.balance.back());
   r.motion = std::move(flight);
 }
 
@@ -326,11 +325,11 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   const Stopwatch flight_time;
   size_t told = 0;
   std::vector<LargestStiffening> effect;  // of the flight so far
-  bool by_source = true;
   Checkpoint<TreeTrajectory> checkpoint;
   if (hooks.checkpoint)
     checkpoint = [&](const TreeTrajectory& so_far, size_t outputs) {
       effect = so_far.stiffening_effect;
+      if (outputs < told) told = 0;  // another method has begun anew
       if (will_be_revised(scene, multibody, effect, stiffening)) return;
       Run part = r;
       TreeTrajectory rows = rows_of(so_far, told, outputs);
@@ -338,7 +337,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
         rows.laws.assign(so_far.laws.begin() + static_cast<std::ptrdiff_t>(told),
                          so_far.laws.begin() + static_cast<std::ptrdiff_t>(outputs));
       rows.stiffening_effect = so_far.stiffening_effect, rows.warnings = so_far.warnings;
-      set_flown(scene, std::move(rows), by_source, part);
+      set_flown(scene, std::move(rows), part);
       part.end = end_of(part, scene, so_far.time.back(), so_far.y.back(), so_far.summary);
       part.integrate_seconds = flight_time.seconds();
       hooks.checkpoint(std::move(part), std::exchange(told, outputs));
@@ -347,19 +346,16 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   const auto fly = [&] {
     told = 0;
     r.tree = std::make_shared<const Tree>(multibody, stiffening);
-    const std::optional<HubOfTree> hub = hub_of(*r.tree);
-    by_source = !hub;
-    IntegratorOptions options = integrator_options(scene, hooks, hub ? "exponential" : "auto", max_steps);
+    IntegratorOptions options = integrator_options(scene, hooks, "auto", max_steps);
     set_corners(scene, options);
     if (scene.from) options.stops = scene.from->stops(joint_names(scene));
-    const VectorXd y0 = first_state(scene, *r.tree);
-    flight = hub ? integrate(*r.tree, *hub, y0, options, checkpoint) : integrate(*r.tree, y0, options, checkpoint);
+    flight = integrate(*r.tree, first_state(scene, *r.tree), options, checkpoint);
     effect = flight.stiffening_effect;
     return flight.summary.interrupted;
   };
   fly_until_settled(scene, multibody, effect, stiffening, fly);
   r.end = end_of(r, scene, flight.time.back(), flight.y.back(), flight.summary);
-  set_flown(scene, std::move(flight), by_source, r);
+  set_flown(scene, std::move(flight), r);
   r.integrate_seconds = flight_time.seconds();
   return r;
 }

@@ -42,7 +42,7 @@ bool will_be_revised(const Scene&, const Multibody&, const std::vector<LargestSt
 void fly_until_settled(const Scene&, const Multibody&, std::vector<LargestStiffening>& effect, std::vector<Stiffening>&,
                        const std::function<bool()>& fly);
 
-/// One flight in relative coordinates, a hub with hinged booms by its own equations. Geometric stiffness "auto" is on
+/// One flight in relative coordinates. Geometric stiffness "auto" is on
 /// where it exceeds the tolerance at the start, under the prescribed motions, or (then the flight is repeated with it)
 /// at any output. `max_steps` > 0 bounds its cost. @throws InputError, NumericalError.
 Run fly_tree(const Scene&, std::vector<PreparedBody>, const RunHooks&, long max_steps);
@@ -59,7 +59,7 @@ struct Moment {
   double time = 0;
   TreeState state;               // joints as Scene::joints
   std::vector<JointLoad> loads;  // the same
-  TreeBalance balance;
+  Balance balance;
 };
 
 /// Columns of trajectory.csv. The rows are asked for one after the other.

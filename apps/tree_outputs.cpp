@@ -144,7 +144,7 @@ OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
       const Vector3d angles = lvlh_angles(attitude_of(scene.joints[flying], s.joints[flying]), *orbit, now.time);
       out.put("lvlh.roll", angles.x()), out.put("lvlh.pitch", angles.y()), out.put("lvlh.yaw", angles.z());
     }
-    const TreeBalance& e = now.balance;
+    const Balance& e = now.balance;
     out.put("energy.kinetic", e.kinetic), out.put("energy.elastic", e.elastic);
     out.put("energy.potential", e.potential), out.put("energy.dissipated", e.dissipated);
     out.put("energy.work", e.work);

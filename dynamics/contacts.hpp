@@ -15,8 +15,8 @@ enum class EventKind : char { stop, kink, engage, disengage, stick, slip, impact
 
 /// A crossing of a stop, or another event of a joint.
 struct StopEvent {
-  double time = 0;      // [s]
-  int joint = 0;        // hinge of a System, joint of other scenes
+  double time = 0;  // [s]
+  int joint = 0;
   bool contact = true;  // true: touches the stop, false: leaves it
   double rate = 0;      // of the joint there, before what comes of it [rad/s] or [m/s]
   EventKind kind = EventKind::stop;

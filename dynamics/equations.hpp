@@ -40,24 +40,18 @@ struct BodyOf {
   size_t row_begin(size_t k) const { return diagonal ? k : 0; }
   size_t row_end(size_t k) const { return diagonal ? k + 1 : static_cast<size_t>(n); }
 
-  Vec3<C> d;  // hinge point, hub axes
-  Mat3<C> B;  // columns stowed, outward, stowed x outward: boom axes at Theta = 0 -> hub axes
   C cos_threshold = 0, sin_threshold = 0;
   C stiffness = 0, preload = 0;  // spring torque = preload - stiffness Delta
   C damping = 0, stop_stiffness = 0;
 };
 using Body = BodyOf<double>;
 
-/// Quantities of one body that the second sweep needs again.
+/// Quantities of one body that later sweeps need.
 template <class T>
 struct BodyScratch {
-  Mat3<T> A;                // boom -> hub axes
   std::vector<Vec3<T>> Cr;  // Cr(q), n
   std::vector<Vec3<T>> Gw;  // Me^-1 Cr^T, n
   std::vector<T> b, g;      // modal force and Me^-1 of it, n
-  Vec3<T> t0, w0;           // hinge row after elimination of q
-  T b0{}, inverse_J_left{};
-  GravityLoad<T> gravity;  // in a field only
 
   explicit BodyScratch(size_t n = 0) : Cr(n), Gw(n), b(n), g(n) {}
 };
@@ -115,22 +109,6 @@ void subtract_product(Mat3<T>& a, const Vec3<S>& u, const Vec3<T>& v) {
   a.row[0] -= u.x * v;
   a.row[1] -= u.y * v;
   a.row[2] -= u.z * v;
-}
-
-/// Boom axes -> hub axes at gap Delta: B Rz(threshold + Delta).
-template <class C, class T>
-Mat3<T> boom_axes(const BodyOf<C>& body, const T& gap) {
-  using std::cos;
-  using std::sin;
-  const T cd = cos(gap), sd = sin(gap);
-  const T c = body.cos_threshold * cd - body.sin_threshold * sd;
-  const T s = body.sin_threshold * cd + body.cos_threshold * sd;
-  Mat3<T> A;
-  for (size_t i = 0; i < 3; ++i) {
-    const Vec3<C>& b = body.B.row[i];
-    A.row[i] = {b.x * c + b.y * s, b.y * c - b.x * s, T(b.z)};
-  }
-  return A;
 }
 
 /// Torque of the hinge along +Theta (eqs. 16-19). `closed`: 1 where the stop is, else 0.
@@ -199,132 +177,6 @@ void modal_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q, const T* 
   add_inertial_forces(body, w, q, q_dot, s.b.data());
 }
 
-/// Adds gravity to force, torque and modal forces (`s.b`) of one body in its own axes: m a + G mc, mc x a + axial(G J),
-/// Ct^T a - 1/2 G : dJ/dq_k. `field`: about the hub's origin, hub axes; w: of the body; Ct_rate = Ct q_dot.
-template <class C>
-void add_gravity(const BodyOf<C>& body, const Gravity<double>& field, const Vec3<C>& w_hub, const Vec3<C>& w,
-                 const C* q, const Inertia<C>& inertia, const Vec3<C>& Ct_rate, BodyScratch<C>& s, Vec3<C>& ft,
-                 Vec3<C>& fw) {
-  const Gravity<C> here = field.at(body.d, s.A);
-  const Vec3<C>& a = here.acceleration;
-  const Sym3<C>& G = here.gradient;
-  const Vec3<C> force = body.m * a + G * inertia.mc;
-  const Vec3<C> torque = cross(inertia.mc, a) + gradient_torque(G, inertia.J);
-  ft += force;
-  fw += torque;
-  const C g[] = {G.xx, G.yy, G.zz, 2.0 * G.xy, 2.0 * G.yz, 2.0 * G.zx};
-  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) s.b[k] += dot(body.Ct[k], a);
-  for (const TermOf<C>& t : body.J1) s.b[static_cast<size_t>(t.k)] -= 0.5 * t.value * g[t.component];
-  for (const TermOf<C>& t : body.J2) s.b[static_cast<size_t>(t.k)] -= t.value * q[t.l] * g[t.component];
-  s.gravity.force = s.A * force;
-  s.gravity.power = dot(s.gravity.force, cross(w_hub, body.d)) + dot(torque, w) + dot(a, Ct_rate) -
-                    0.5 * contraction(G, inertia.J_dot);
-}
-
-/// First sweep: one body's equations at its own frame acceleration (a, alpha), with q_ddot and Delta_ddot eliminated,
-/// added to the hub's. `field`: gravity about the hub's origin, hub axes, or null; of values only, not of derivatives.
-template <class C, class T>
-void condense(const BodyOf<C>& body, const Vec3<T>& w_hub, const T* p, const T* u, const C& closed, BodyScratch<T>& s,
-              bool fixed_hub, HubSystem<T>& hub, [[maybe_unused]] const Gravity<double>* field = nullptr) {
-  const auto n = static_cast<size_t>(body.n);
-  const T* q = p + 1;
-  const T* q_dot = u + 1;
-  const T rate = u[0];
-  s.A = boom_axes(body, p[0]);
-
-  // Angular velocity of the boom, and its frame acceleration when all accelerations of the unknowns are zero.
-  const Vec3<T> w_carried = transposed_product(s.A, w_hub);
-  Vec3<T> w = w_carried;
-  w.z += rate;
-  const Vec3<T> a_bias = transposed_product(s.A, cross(w_hub, cross(w_hub, body.d)));
-  const Vec3<T> alpha_bias = {rate * w_carried.y, -(rate * w_carried.x), T(0.0)};
-
-  const Inertia<T> inertia = inertia_at(body, q, q_dot, s);
-  modal_forces(body, w, q, q_dot, s);
-
-  // Forces less the mass matrix times the bias accelerations (README, "Equations of motion").
-  Vec3<T> Ct_rate{}, Cr_rate{};
-  for (size_t k = 0; k < n; ++k) {
-    Ct_rate += q_dot[k] * body.Ct[k];
-    Cr_rate += q_dot[k] * s.Cr[k];
-    s.b[k] -= dot(body.Ct[k], a_bias) + dot(s.Cr[k], alpha_bias);
-  }
-  Vec3<T> ft = -(cross(w, cross(w, inertia.mc) + 2.0 * Ct_rate) + body.m * a_bias + cross(alpha_bias, inertia.mc));
-  Vec3<T> fw =
-      -(cross(w, inertia.J * w + Cr_rate) + inertia.J_dot * w + cross(inertia.mc, a_bias) + inertia.J * alpha_bias);
-
-  if constexpr (std::is_same_v<T, C>)
-    if (field) add_gravity(body, *field, w_hub, w, q, inertia, Ct_rate, s, ft, fw);
-
-  // Eliminate q_ddot, then Delta_ddot.
-  s.t0 = {-inertia.mc.y, inertia.mc.x, T(0.0)};
-  s.w0 = {inertia.J.zx, inertia.J.yz, inertia.J.zz};
-  s.b0 = fw.z + hinge_torque(body, p[0], rate, closed);
-  T J_left = inertia.J.zz;
-  for (size_t k = 0; k < n; ++k) {
-    s.Gw[k] = Vec3<T>{};
-    s.g[k] = T(0.0);
-    for (size_t l = body.row_begin(k); l < body.row_end(k); ++l) {
-      s.Gw[k] += body.Me_inverse[k * n + l] * s.Cr[l];
-      s.g[k] += body.Me_inverse[k * n + l] * s.b[l];
-    }
-    const T c = s.Cr[k].z;
-    J_left -= c * s.Gw[k].z;
-    s.t0 -= c * body.Gt[k];
-    s.w0 -= c * s.Gw[k];
-    s.b0 -= c * s.g[k];
-  }
-  s.inverse_J_left = T(1.0) / J_left;
-  if (fixed_hub) return;
-
-  Sym3<T> tt = {T(body.m - body.Ctt.xx), T(body.m - body.Ctt.yy), T(body.m - body.Ctt.zz),
-                T(-body.Ctt.xy),         T(-body.Ctt.yz),         T(-body.Ctt.zx)};
-  const Vec3<T>& mc = inertia.mc;
-  const T zero(0.0);
-  Mat3<T> tw = {{Vec3<T>{zero, mc.z, -mc.y}, Vec3<T>{-mc.z, zero, mc.x}, Vec3<T>{mc.y, -mc.x, zero}}};  // -tilde(mc)
-  Sym3<T> ww = inertia.J;
-  for (size_t k = 0; k < n; ++k) {
-    subtract_product(tw, body.Ct[k], s.Gw[k]);
-    const Vec3<T>& w_k = s.Cr[k];
-    const Vec3<T>& g_k = s.Gw[k];
-    ww.xx -= w_k.x * g_k.x, ww.yy -= w_k.y * g_k.y, ww.zz -= w_k.z * g_k.z;
-    ww.xy -= w_k.x * g_k.y, ww.yz -= w_k.y * g_k.z, ww.zx -= w_k.z * g_k.x;
-    ft -= s.g[k] * body.Ct[k];
-    fw -= s.g[k] * w_k;
-  }
-  subtract_dyad(tt, s.inverse_J_left, s.t0);
-  subtract_dyad(ww, s.inverse_J_left, s.w0);
-  subtract_product(tw, s.t0, s.inverse_J_left * s.w0);
-  const T b_scaled = s.b0 * s.inverse_J_left;
-  ft -= b_scaled * s.t0;
-  fw -= b_scaled * s.w0;
-
-  // To hub axes and about the hub's origin: a = a_hub - d x omega_dot.
-  const Sym3<T> TT = rotate(s.A, tt);
-  const Mat3<T> TW = rotate(s.A, tw);
-  const Vec3<T> FT = s.A * ft;
-  hub.tt += TT;
-  hub.ft += FT;
-  hub.fw += s.A * fw + cross(body.d, FT);
-  hub.ww += rotate(s.A, ww);
-  const Mat3<T> T_full = {{Vec3<T>{TT.xx, TT.xy, TT.zx}, Vec3<T>{TT.xy, TT.yy, TT.yz}, Vec3<T>{TT.zx, TT.yz, TT.zz}}};
-  // TT d~ has rows (d x row)..: (row . d~ v) = row . (d x v) = (row x d) . v
-  Mat3<T> shifted = TW;  // tw - tt d~
-  for (size_t i = 0; i < 3; ++i) {
-    shifted.row[i] -= cross(T_full.row[i], body.d);
-    hub.tw.row[i] += shifted.row[i];
-  }
-  // ww gains d~ tw + (d~ tw)^T - d~ tt d~ = d~ tw' + (d~ tw)^T with tw' = tw - tt d~, and (d~ tw)^T = -tw^T d~.
-  // Column j of tw is (row0_j, row1_j, row2_j); (d~ X)_{ij} = (d x column_j)_i.
-  const Vec3<C>& d = body.d;
-  const auto shift = [&d](const Mat3<T>& X) {
-    return Mat3<T>{{d.y * X.row[2] - d.z * X.row[1], d.z * X.row[0] - d.x * X.row[2], d.x * X.row[1] - d.y * X.row[0]}};
-  };
-  const Mat3<T> left = shift(shifted), right = shift(TW);
-  hub.ww += Sym3<T>{left.row[0].x + right.row[0].x, left.row[1].y + right.row[1].y, left.row[2].z + right.row[2].z,
-                    left.row[0].y + right.row[1].x, left.row[1].z + right.row[2].y, left.row[2].x + right.row[0].z};
-}
-
 /// Solves the 6 x 6 system of the hub by two 3 x 3 Cholesky factorisations in blocks (LDL^T of the whole, unrolled by a
 /// loop).
 template <class T>
@@ -352,27 +204,6 @@ void solve_hub(const HubSystem<T>& h, Vec3<T>& a, Vec3<T>& alpha) {
   }
   a = {x[0], x[1], x[2]};
   alpha = {x[3], x[4], x[5]};
-}
-
-/// Second sweep: what accelerations of the hub add to Delta_ddot and q_ddot of one body.
-template <class C, class T>
-void respond(const BodyOf<C>& body, const BodyScratch<T>& s, const Vec3<double>& a_hub, const Vec3<double>& alpha_hub,
-             T* out) {
-  const Vec3<T> a = transposed_product(s.A, lift<C>(a_hub) - cross(body.d, alpha_hub));
-  Vec3<T> alpha = transposed_product(s.A, alpha_hub);
-  out[0] = -((dot(s.t0, a) + dot(s.w0, alpha)) * s.inverse_J_left);
-  alpha.z += out[0];
-  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) out[1 + k] = -(dot(body.Gt[k], a) + dot(s.Gw[k], alpha));
-}
-
-/// Second sweep: Delta_ddot and q_ddot of one body from the accelerations of the hub.
-template <class C, class T>
-void release(const BodyOf<C>& body, const BodyScratch<T>& s, const Vec3<double>& a_hub, const Vec3<double>& alpha_hub,
-             T* out) {
-  respond(body, s, a_hub, alpha_hub, out);
-  const T own = s.b0 * s.inverse_J_left;
-  out[0] += own;
-  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) out[1 + k] += s.g[k] - own * s.Gw[k].z;
 }
 
 }  // namespace flexboom::equations

@@ -119,7 +119,7 @@ class ExponentialStepper final : public Stepper {
   }
 
   /// By the linear part alone, with the remainder as it is at the start.
-  void foresee(double t_end, const std::function<void(const VectorXd& y)>& look) override {
+  void predict(double t_end, const std::function<void(const VectorXd& y)>& look) override {
     const double left = t_end - step_.start;
     step_.M.setZero();
     VectorXd y = start_;
@@ -153,6 +153,8 @@ class ExponentialStepper final : public Stepper {
     step_.linear->to_x(between_, Y.topLeftCorner(nx_, count));
     for (Index i = 0; i < count; ++i) motion_.place(step_, fraction(i), Y.col(i));
   }
+
+  double fastest() const override { return step_.linear->fastest; }
 
   StepCounts counts() const override { return counts_; }
 
@@ -189,25 +191,31 @@ class ExponentialStepper final : public Stepper {
   }
 
   std::unique_ptr<LinearPart> make_linear_part(const VectorXd& base) {
-    MatrixXd J = problem_->linear(step_.start, base.data(), contact_);
     ++counts_.jacobian_evaluations;
     ++counts_.factorisations;
-    for (const int i : layout_.prescribed) J.row(i).setZero(), J.col(i).setZero();
     // A coordinate that nothing pulls back (a hinge without a spring) has no two eigenvectors of its own. With a period
     // of two hours in L it has; the remainder takes the difference.
     constexpr double pull = 1e-6;
-    for (const auto& [value, rate] : layout_.coordinates)
-      if (J.col(value).cwiseAbs().maxCoeff() < pull) J(rate, value) -= pull;
-    if (const auto [other, stop] = neighbour(base); other != nullptr) {
-      const int column = layout_.gaps[stop].value;
-      MatrixXd change = J - other->L;
-      change.col(column).setZero();
+    const auto hold = [](MatrixXd& J, const SplitLayout::Coordinate& c) {
+      if (J.col(c.value).cwiseAbs().maxCoeff() < pull) J(c.rate, c.value) -= pull;
+    };
+    // On its threshold a stop has no force, and is in the column of its gap alone.
+    const auto [other, stop] = neighbour(base);
+    if (other != nullptr && base[layout_.gaps[stop].value] == 0) {
+      const SplitLayout::Coordinate& gap = layout_.gaps[stop];
+      const int column = gap.value;
+      MatrixXd J = other->L;
+      J.col(column) = problem_->linear(step_.start, base.data(), contact_, column, 1);
+      hold(J, gap);
       try {
-        if (change.isZero(0)) return std::make_unique<LinearPart>(*other, J, column);
+        return std::make_unique<LinearPart>(*other, J, column);
       } catch (const NumericalError&) {
         // The block alone has no full set of eigenvectors, or two in one place; all of L may do.
       }
     }
+    MatrixXd J = problem_->linear(step_.start, base.data(), contact_, 0, nx_);
+    for (const int i : layout_.prescribed) J.row(i).setZero(), J.col(i).setZero();
+    for (const SplitLayout::Coordinate& c : layout_.coordinates) hold(J, c);
     std::vector<int> omegas;
     for (const SplitLayout::Turn& turn : layout_.turns) omegas.push_back(turn.omega);
     try {
@@ -323,7 +331,7 @@ class ExponentialStepper final : public Stepper {
         step_.linear->to_x(step_.Z.rightCols(degree), step_.X.rightCols(degree));
       } else {  // the end says whether the points stand still: at the others not all of x is wanted then
         at_end_.col(0) = step_.Z.col(degree);
-        foresee_error(at_end_.col(1));
+        predict_error(at_end_.col(1));
         step_.linear->to_x(at_end_, x_at_end_);
         change = norm(x_at_end_.col(0) - step_.X.col(degree));
         step_.X.col(degree) = x_at_end_.col(0);
@@ -347,7 +355,7 @@ class ExponentialStepper final : public Stepper {
   }
 
   /// What the middle point adds to the interpolation by the others, carried to the end of the step.
-  void foresee_error(Eigen::Ref<VectorXd> z) {
+  void predict_error(Eigen::Ref<VectorXd> z) {
     error_modes_.noalias() = step_.N * collocation::middle_difference();
     M_error_.noalias() = step_.length * error_modes_ * middle_.transpose();
     step_.linear->combine((*step_.grid)[degree], 0, zero_, M_error_, z);

@@ -42,15 +42,16 @@ struct FlightOptions {
   double duration = 10;       // [s], the time at the end
   double output_step = 0.01;  // [s]
   /// A hinge whose rate at the stop falls below this fraction of its largest rate so far has settled: its crossings are
-  /// no longer located (its stop counts as open) until the rate doubles. Negative: the tolerance. Zero: never.
+  /// no longer located (its stop counts as open) until the rate doubles. Zero: never. Negative: a hundredth of the
+  /// tolerance, no less than the tolerance or 1e-10.
   double settle = -1;
-  /// Per hinge of a System, per joint of other scenes: of a flight that this one goes on. Empty: none was met.
+  /// Per joint: of a flight that this one goes on. Empty: none was met.
   std::vector<StopHistory> stops{};
   MotionScales largest{};  // of a flight that this one goes on
   /// Times where forces or prescribed motions are not smooth, ascending [s]: a step ends there and the method starts
-  /// anew. Not of a System.
+  /// anew.
   std::vector<double> corners{};
-  /// No step passes an output: what forces do for as long as that is not stepped over. Not of a System.
+  /// No step passes an output: what forces do for as long as that is not stepped over.
   bool step_to_outputs = false;
   long max_steps = 200'000'000;
   const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is

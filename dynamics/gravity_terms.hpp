@@ -42,11 +42,4 @@ T contraction(const Sym3<T>& G, const Sym3<T>& S) {
   return G.xx * S.xx + G.yy * S.yy + G.zz * S.zz + 2.0 * (G.xy * S.xy + G.yz * S.yz + G.zx * S.zx);
 }
 
-/// Gravity on one body.
-template <class T>
-struct GravityLoad {
-  Vec3<T> force;  // hub axes [N]
-  T power = 0;    // without the velocity of the hub's origin [W]
-};
-
 }  // namespace flexboom::equations

@@ -1,10 +1,7 @@
 #pragma once
 
-#include <Eigen/Core>
-
 #include <algorithm>
 #include <numbers>
-#include <string>
 
 namespace flexboom {
 
@@ -27,15 +24,5 @@ inline double energy(const HingeMechanism& m, double gap) {
   const double stretch = gap + m.threshold - m.rest, depth = std::max(0.0, gap);
   return 0.5 * m.stiffness * stretch * stretch + 0.5 * m.stop_stiffness * depth * depth;
 }
-
-/// Hinge between the hub and a boom. At angle Theta the boom's x axis is cos(Theta) stowed + sin(Theta) outward, its y
-/// axis the derivative of that (positive deflection), its z axis the hinge axis; the boom's BRF origin is at `point`.
-struct Hinge {
-  std::string name;
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();     // on the hub, hub BRF [m]
-  Eigen::Vector3d stowed = Eigen::Vector3d::UnitY();   // unit, hub axes
-  Eigen::Vector3d outward = Eigen::Vector3d::UnitX();  // unit, normal to stowed
-  HingeMechanism mechanism;
-};
 
 }  // namespace flexboom

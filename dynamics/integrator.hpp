@@ -1,7 +1,6 @@
 #pragma once
 
 #include "dynamics/contacts.hpp"
-#include "dynamics/system.hpp"
 #include "fem/check.hpp"
 
 #include <Eigen/Core>
@@ -19,9 +18,9 @@ class Ode;
 class SplitProblem;
 
 struct IntegratorOptions : FlightOptions {
-  std::string method = "exponential";
-  /// Measure the hinge's error against its motion since the last event instead of its largest motion: late, tiny
-  /// contacts keep their relative accuracy. Costs steps. Of a System.
+  std::string method = "auto";
+  /// Measure errors against the motion since the last event instead of the largest motion: late, tiny contacts keep
+  /// their relative accuracy. Costs steps.
   bool rescale_at_events = false;
 };
 
@@ -41,23 +40,9 @@ struct IntegrationSummary {
   double momentum_drift = unknown;  // max change of both momenta, each over its scale; unknown where they change
   double constraint_drift = 0;      // max | |quaternion| - 1 |; the joints are exact in relative coordinates
   MotionScales largest;             // what energy_balance and momentum_drift are relative to
-  std::vector<StopHistory> stops;   // per hinge of a System, per joint of other scenes
+  std::vector<StopHistory> stops;   // per joint
   bool interrupted = false;
 };
-
-struct Trajectory {
-  std::vector<double> time;
-  std::vector<Eigen::VectorXd> y;  // System::layout()
-  std::vector<Balance> balance;
-  std::vector<StopEvent> events;
-  IntegrationSummary summary;
-};
-
-/// Flies the system from y0 at the start.
-/// @throws InputError for an unknown method (listing those that exist) or bad options; NumericalError when the method
-/// fails.
-Trajectory integrate(const System&, const Eigen::VectorXd& y0, const IntegratorOptions&,
-                     const Checkpoint<Trajectory>& = {});
 
 /// What a method needs to weigh an error: |error_i| is measured in units of tolerance * scale_i.
 struct ErrorScale {
@@ -93,7 +78,9 @@ class Stepper {
   virtual void step(double t_end, double& t, Eigen::VectorXd& y, std::span<int> crossed) = 0;
   /// States that the motion may come near until t_end, as far as that is known without flying there: sizes to weigh
   /// errors by. After a restart.
-  virtual void foresee(double /*t_end*/, const std::function<void(const Eigen::VectorXd& y)>&) {}
+  virtual void predict(double /*t_end*/, const std::function<void(const Eigen::VectorXd& y)>&) {}
+  /// Largest eigenvalue of the linear part that the last step took out, where the method takes one [1/s].
+  virtual double fastest() const { return 0; }
   /// y within the last step.
   virtual void interpolate(double t, Eigen::VectorXd& y) = 0;
   /// States within the last step, a column each; Y has the size of a state, and as many columns or more.

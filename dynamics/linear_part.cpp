@@ -53,6 +53,7 @@ LinearPart::LinearPart(Spectrum spectrum, MatrixXd L_of_x, std::vector<int> omeg
       of_modes(from_modes.transpose()),
       base(std::move(base_state)),
       omegas(std::move(omegas_in_x)),
+      fastest(lambda.size() ? lambda.cwiseAbs().maxCoeff() : 0.0),
       lambda_re_(lambda.real()),
       lambda_im_(lambda.imag()),
       used_(lambda.size() + (lambda_im_.array() != 0).count()) {
@@ -62,7 +63,6 @@ LinearPart::LinearPart(Spectrum spectrum, MatrixXd L_of_x, std::vector<int> omeg
     omega_modes.middleRows<3>(3 * static_cast<Index>(i)) = from_modes.middleRows<3>(omegas[i]);
   drift_modes = omega_modes;
   const Index m = lambda.size();
-  const double fastest = lambda.cwiseAbs().maxCoeff();
   for (Index i = 0; i < m; ++i)
     if (std::abs(lambda[i]) > 1e-9 * fastest) drift_modes.col(i).setZero(), drift_modes.col(m + i).setZero();
 }

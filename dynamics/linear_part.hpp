@@ -63,7 +63,8 @@ struct LinearPart : Spectrum {
   Eigen::MatrixXd watched_modes;  // some entries of x by z, for who wants them alone
   Eigen::VectorXd base;
   std::vector<int> omegas;
-  double step = 0;  // to try first after an event: that of the last time, or a longer one where its error was small
+  double fastest = 0;  // largest |eigenvalue| [1/s]
+  double step = 0;     // to try first after an event: that of the last time, or a longer one where its error was small
 
  private:
   LinearPart(Spectrum, Eigen::MatrixXd L, std::vector<int> omegas, Eigen::VectorXd base);

@@ -3,7 +3,7 @@
 #include "dynamics/contacts.hpp"
 #include "dynamics/energy_ledger.hpp"
 #include "dynamics/multibody.hpp"
-#include "dynamics/system.hpp"
+#include "dynamics/tree.hpp"
 
 #include <Eigen/Core>
 

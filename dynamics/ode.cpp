@@ -1,37 +1,12 @@
 #include "dynamics/ode.hpp"
 
-#include "fem/check.hpp"
-
-#include <Eigen/LU>
+#include "dynamics/newton_matrix.hpp"
 
 #include <vector>
 
 namespace flexboom {
 
 namespace {
-
-class OdeOfSystem final : public Ode {
- public:
-  explicit OdeOfSystem(const System& system) : system_(system), work_(system.workspace()) {}
-
-  std::unique_ptr<Ode> another() const override { return ode_of(system_); }
-  int size() const override { return system_.layout().size; }
-  int stops() const override { return static_cast<int>(system_.appendages().size()); }
-  void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) override {
-    system_.derivative(t, y, contact, *work_, y_dot);
-  }
-  void jacobian(double, const double* y, std::span<const char> contact) override {
-    system_.jacobian(y, contact, *work_);
-  }
-  void factorise(double gamma) override { system_.factorise_newton(gamma, *work_); }
-  void solve(const double* b, double* x) override { system_.solve_newton(b, *work_, x); }
-  double gap(const double* y, int stop) const override { return system_.gap(y, stop); }
-  double gap_rate(const double* y, int stop) const override { return system_.gap_rate(y, stop); }
-
- private:
-  const System& system_;
-  WorkspaceHandle work_;
-};
 
 class OdeOfTree final : public Ode {
  public:
@@ -50,18 +25,11 @@ class OdeOfTree final : public Ode {
     tree_.derivative(t, y, of_joints(contact), *work_, y_dot, laws_.branches());
   }
   void jacobian(double t, const double* y, std::span<const char> contact) override {
-    tree_.jacobian(t, y, of_joints(contact), *work_, J_, laws_.branches());
+    tree_.jacobian(t, y, of_joints(contact), *work_, newton_.J, laws_.branches());
+    newton_.sort();
   }
-  void factorise(double gamma) override {
-    newton_ = -gamma * J_;
-    newton_.diagonal().array() += 1.0;
-    if (!newton_.allFinite()) throw NumericalError("the Jacobian of the equations of motion is not finite");
-    lu_.compute(newton_);
-  }
-  void solve(const double* b, double* x) override {
-    x_ = lu_.solve(Eigen::Map<const Eigen::VectorXd>(b, size()));
-    Eigen::Map<Eigen::VectorXd>(x, size()) = x_;
-  }
+  void factorise(double gamma) override { newton_.factorise(gamma); }
+  void solve(const double* b, double* x) override { newton_.solve(b, x); }
   double gap(const double* y, int stop) const override { return tree_.gap(y, joint(stop)); }
   double gap_rate(const double* y, int stop) const override { return tree_.gap_rate(y, joint(stop)); }
 
@@ -99,14 +67,12 @@ class OdeOfTree final : public Ode {
   const Laws& laws_;
   TreeWorkspaceHandle work_;
   std::vector<char> contact_;  // as of the last call
-  Eigen::MatrixXd J_, newton_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  NewtonMatrix newton_;
   Eigen::VectorXd x_, y_dot_;
 };
 
 }  // namespace
 
-std::unique_ptr<Ode> ode_of(const System& system) { return std::make_unique<OdeOfSystem>(system); }
 std::unique_ptr<Ode> ode_of(const Tree& tree, const Laws& laws) { return std::make_unique<OdeOfTree>(tree, laws); }
 
 }  // namespace flexboom

@@ -1,7 +1,6 @@
 #pragma once
 
 #include "dynamics/laws.hpp"
-#include "dynamics/system.hpp"
 #include "dynamics/tree.hpp"
 
 #include <memory>
@@ -33,7 +32,6 @@ class Ode {
   virtual Gap switch_gap(double /*t*/, const double* /*y*/, int /*number*/) { return {}; }
 };
 
-std::unique_ptr<Ode> ode_of(const System&);
 /// laws: as they are whenever the equations are asked.
 std::unique_ptr<Ode> ode_of(const Tree&, const Laws& laws);
 

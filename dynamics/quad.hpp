@@ -1,7 +1,5 @@
 #pragma once
 
-#include "dynamics/dual.hpp"
-
 #include <cmath>
 
 namespace flexboom {
@@ -37,19 +35,14 @@ inline Quad cos(const Quad& a) {
   return lane_by_lane(a, [](double x) { return std::cos(x); });
 }
 
-/// Bodies in one number.
-template <class T>
-inline constexpr int lanes_of = 1;
-template <>
-inline constexpr int lanes_of<Quad> = Quad::width;
-
 inline double lane(double a, int) { return a; }
 inline double lane(const Quad& a, int i) { return a.v[i]; }
-inline void set_lane(double& a, int, double value) { a = value; }
 inline void set_lane(Quad& a, int i, double value) { a.v[i] = value; }
-template <int N, class V>
-void set_lane(Dual<N, V>& a, int i, double value) {
-  set_lane(a.v, i, value);
+/// The sum of the first `count` lanes.
+inline double sum(const Quad& a, int count) {
+  double s = 0;
+  for (int i = 0; i < count; ++i) s += a.v[i];
+  return s;
 }
 
 }  // namespace flexboom

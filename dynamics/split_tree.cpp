@@ -65,9 +65,9 @@ class SplitTree final : public SplitProblem {
         y_(layout_.size) {
     for (const tree::Link& link : model_.links) {  // parents come first
       if (link.parent < 0)
-        roots_.push_back(link.kind == JointKind::free ? floating_++ : -1);
+        root_of_.push_back(link.kind == JointKind::free ? floating_++ : -1);
       else
-        roots_.push_back(roots_[static_cast<size_t>(link.parent)]);
+        root_of_.push_back(root_of_[static_cast<size_t>(link.parent)]);
       if (link.parent < 0 && link.kind == JointKind::free) root_links_.push_back(&link);
     }
   }
@@ -79,63 +79,49 @@ class SplitTree final : public SplitProblem {
   }
 
   Vector3d outside_acceleration(size_t root, double, const double*) override {
+    tree::Scratch<double>& scratch = work_->scratch;
     Vector3d force = Vector3d::Zero();
     double m = 0;
-    for (size_t i = 0; i < model_.links.size(); ++i) {
-      if (roots_[i] != static_cast<int>(root)) continue;
-      const tree::LinkScratch<double>& s = work_->scratch.links[i];
+    const auto counts = [&](size_t link) { return root_of_[link] == static_cast<int>(root); };
+    for (const size_t i : scratch.singles) {
+      if (!counts(i)) continue;
       m += model_.links[i].body.m;
-      if (model_.poses) force += eigen(s.A0 * s.external.t);
+      if (model_.poses) force += eigen(scratch.links[i].A0 * scratch.links[i].external.t);
+    }
+    for (size_t i = 0; i < scratch.leaves.size(); ++i) {
+      const tree::Leaves& leaves = model_.leaves[i];
+      if (!counts(static_cast<size_t>(leaves.link[0]))) continue;
+      const tree::LinkScratch<Quad>& s = scratch.leaves[i].link;
+      m += sum(leaves.body.m, leaves.count);
+      if (tree_.scene().field) force += eigen(tree::sum(s.A0 * s.external.t, leaves.count));
     }
     return to_root(root) * (tree_.scene().gravity + force / m);
   }
 
-  MatrixXd linear(double t, const double* y, std::span<const char> contact) override {
-    tree_.jacobian(t, y, of_joints(contact), *work_, J_);
-    return J_.topLeftCorner(layout_.x, layout_.x);
+  MatrixXd linear(double t, const double* y, std::span<const char> contact, int first, int count) override {
+    MatrixXd columns(layout_.x, count);
+    tree_.jacobian_columns(t, y, of_joints(contact), *work_, first, columns);
+    return columns;
   }
 
   FloatingBodies floating(size_t root, double t, const double* y) override {
     y_ = Eigen::Map<const VectorXd>(y, layout_.size);
     for (const SplitLayout::Root& r : layout_.roots)
       y_.segment<3>(r.position).setZero(), y_.segment<3>(r.velocity).setZero();
-    tree::Scratch<double>& scratch = work_->scratch;
     tree::set_instant(model_, t, work_->instant);
-    tree::move_links(model_, y_.data(), work_->instant, true, scratch);
-    const Vector3d origin = eigen(root_links_[root]->a.position);
-    double m = 0;
-    Vector3d moment = Vector3d::Zero(), P = Vector3d::Zero(), H = Vector3d::Zero();
-    Matrix3d J = Matrix3d::Zero();
-    for (size_t i = 0; i < model_.links.size(); ++i) {
-      if (roots_[i] != static_cast<int>(root)) continue;
-      tree::LinkScratch<double>& s = scratch.links[i];
-      tree::add_body(model_.links[i], y_.data(), s);
-      const tree::LinkMomenta own = tree::momenta(model_.links[i], s, y_.data() + model_.links[i].q_dot);
-      const double mass = model_.links[i].body.m;
-      const Vector3d R = eigen(s.R0) - origin, c = eigen(s.A0 * s.mc), linear = eigen(s.A0 * own.linear);
-      m += mass, moment += mass * R + c, P += linear;
-      H += eigen(s.A0 * own.angular) + R.cross(linear);
-      J += spatial::eigen(equations::rotate(s.A0, s.J)) + spread(R, R, mass) + spread(R, c, 1) + spread(c, R, 1);
-    }
-    for (size_t i = 0; i < model_.wheels.size(); ++i) {
-      const auto link = static_cast<size_t>(model_.wheels[i].link);
-      if (roots_[link] != static_cast<int>(root)) continue;
-      const tree::LinkScratch<double>& s = scratch.links[link];
-      const Vec3<double>& axis = model_.wheels[i].at.position;
-      const Vector3d in_space = eigen(s.A0 * axis);
-      const double inertia = tree_.scene().wheels[i].inertia;
-      H += inertia * (y_[layout_.spins[i]] + dot(axis, s.w)) * in_space;
-      J += inertia * in_space * in_space.transpose();
-    }
-    const Vector3d c = moment / m;
-    const Matrix3d A = to_root(root);
-    return {A * c, A * P / m, A * (J - spread(c, c, m)) * A.transpose(), A * (H - c.cross(P))};
+    const tree::Reference origin = {root_links_[root]->a.position, {}};
+    const tree::Totals all =
+        tree::totals(model_, y_.data(), work_->instant, origin, work_->scratch, root_of_, static_cast<int>(root));
+    const Vector3d c = eigen(all.mass_centre());
+    const Matrix3d A = to_root(root), J = eigen(all.inertia) - mass_at(c, all.m);
+    return {A * c, A * eigen(all.momentum) / all.m, A * J * A.transpose(),
+            A * eigen(all.angular_momentum_about_mass_centre())};
   }
 
  private:
-  /// m (a . b 1 - a b^T), symmetric part.
-  static Matrix3d spread(const Vector3d& a, const Vector3d& b, double m) {
-    return m * (a.dot(b) * Matrix3d::Identity() - 0.5 * (a * b.transpose() + b * a.transpose()));
+  /// The inertia of a mass at r.
+  static Matrix3d mass_at(const Vector3d& r, double m) {
+    return m * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose());
   }
 
   /// Inertial axes -> axes of the root's position.
@@ -155,11 +141,10 @@ class SplitTree final : public SplitProblem {
   SplitLayout layout_;
   TreeWorkspaceHandle work_;
   std::vector<char> contact_;  // per joint
-  std::vector<int> roots_;     // per link: which root it hangs on, or -1
+  std::vector<int> root_of_;   // per link: which root it hangs on, or -1
   std::vector<const tree::Link*> root_links_;
   int floating_ = 0;
   VectorXd y_;
-  MatrixXd J_;
 };
 
 }  // namespace

@@ -41,6 +41,18 @@ void set_instant(const Model& model, double t, Instant& instant) {
   for (size_t i = 0; i < model.wheels.size(); ++i) instant.wheels[i] = value(model.scene->wheels[i].torque);
 }
 
+Scratch<double> link_by_link(const Model& model, double t, const VectorXd& y, std::span<const char> contact,
+                             std::span<const LawBranch> laws) {
+  Scratch<double> scratch(model, false);
+  Instant instant(model);
+  set_instant(model, t, instant);
+  instant.laws = laws;
+  VectorXd y_dot(y.size());
+  derivative(model, y.data(), instant, contact, scratch, y_dot.data());
+  move_links(model, y.data(), instant, true, scratch);
+  return scratch;
+}
+
 }  // namespace tree
 
 namespace {
@@ -82,14 +94,12 @@ std::string mass_fault(const Multibody& scene, const tree::Link& link, const tre
 
 /// A joint must move inertia, else its acceleration is noise. At the state where all coordinates are zero.
 void check_inertia(const Tree& system, const tree::Model& model) {
-  VectorXd y = system.pack(system.at_rest()), y_dot(y.size());
-  const TreeWorkspaceHandle work = system.workspace();
-  tree::set_instant(model, 0, work->instant);
-  tree::derivative(model, y.data(), work->instant, std::vector<char>(system.scene().joints.size(), 0), work->scratch,
-                   y_dot.data());
+  const VectorXd y = system.pack(system.at_rest());
+  const std::vector<char> open(system.scene().joints.size(), 0);
+  const tree::Scratch<double> scratch = tree::link_by_link(model, 0, y, open, {});
   for (size_t i = model.links.size(); i-- > 0;) {  // tips first: what is bad there spoils all before
     const tree::Link& link = model.links[i];
-    const tree::LinkScratch<double>& s = work->scratch.links[i];
+    const tree::LinkScratch<double>& s = scratch.links[i];
     const std::string fault = mass_fault(system.scene(), link, s);
     require(fault.empty(), fault);
     if (link.kind != JointKind::free) continue;
@@ -106,16 +116,39 @@ void check_inertia(const Tree& system, const tree::Model& model) {
   }
 }
 
-/// @throws NumericalError naming the first body, from the tips inwards, whose mass matrix is singular or indefinite.
-void check_mass(const tree::Model& model, double t, const double* y, int size, const tree::Scratch<double>& scratch) {
-  for (size_t i = model.links.size(); i-- > 0;) {
+/// Do the hinges of all leaves move inertia?
+bool leaves_move_inertia(const tree::Leaves& leaves, const tree::LinkScratch<Quad>& s) {
+  if (leaves.kind != JointKind::hinge) return true;
+  const Quad& inverse_D = s.freedom[0].inverse_D;
+  const Quad part = too_little * (leaves.body.J0.xx + leaves.body.J0.yy + leaves.body.J0.zz) * inverse_D;
+  bool all = true;
+  for (int i = 0; i < leaves.count; ++i) all = all && lane(inverse_D, i) > 0 && lane(part, i) < 1;
+  return all;
+}
+
+/// Is no mass matrix singular or indefinite?
+bool is_sound(const tree::Model& model, const tree::Scratch<double>& scratch) {
+  bool sound = true;
+  for (size_t i = 0; i < scratch.leaves.size(); ++i)
+    sound = sound && leaves_move_inertia(model.leaves[i], scratch.leaves[i].link);
+  for (const size_t i : scratch.singles) {
     const tree::Link& link = model.links[i];
     const tree::LinkScratch<double>& s = scratch.links[i];
-    bool sound = has_modal_mass(link, s);
+    sound = sound && has_modal_mass(link, s);
     if (link.kind != JointKind::free && !link.prescribed && !s.held_joint)
       for (int k = 0; k < joint_type(link.kind).freedoms; ++k) sound = sound && moves_inertia(link, s, k);
-    if (sound || !Eigen::Map<const VectorXd>(y, size).allFinite()) continue;
-    throw NumericalError(fmt::format("t = {:.9g} s: {}", t, mass_fault(*model.scene, link, s)));
+  }
+  return sound;
+}
+
+/// @throws NumericalError naming the first body, from the tips inwards, whose mass matrix is singular or indefinite.
+void report_mass(const tree::Model& model, double t, const VectorXd& y, std::span<const char> contact,
+                 std::span<const LawBranch> laws) {
+  if (!y.allFinite()) return;
+  const tree::Scratch<double> scratch = tree::link_by_link(model, t, y, contact, laws);
+  for (size_t i = model.links.size(); i-- > 0;) {
+    const std::string fault = mass_fault(*model.scene, model.links[i], scratch.links[i]);
+    if (!fault.empty()) throw NumericalError(fmt::format("t = {:.9g} s: {}", t, fault));
   }
 }
 
@@ -221,7 +254,8 @@ void Tree::derivative(double t, const double* y, std::span<const char> contact, 
   tree::set_instant(impl_->model, t, w.instant);
   w.instant.laws = laws;
   tree::derivative(impl_->model, y, w.instant, contact, w.scratch, y_dot);
-  check_mass(impl_->model, t, y, impl_->layout.size, w.scratch);
+  if (!is_sound(impl_->model, w.scratch))
+    report_mass(impl_->model, t, Eigen::Map<const VectorXd>(y, impl_->layout.size), contact, laws);
 }
 
 double Tree::hold_load(int joint, const double* y, const TreeWorkspace& w) const {

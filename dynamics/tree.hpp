@@ -33,7 +33,6 @@ struct TreeState {
 /// Places of the parts of y = [p | u | spins | attitudes, positions, velocities of joints | energies].
 /// p: per body the coordinates of the joint that carries it (less the threshold of its mechanism) and q. u: omega of
 /// joints that turn, then the derivative of p. Bodies come in the order of the tree (parents first, else as given).
-/// With one free body that carries hinged ones this is the Layout of System.
 struct TreeLayout {
   struct Joint {  // -1: it has none
     int scalar = -1, omega = -1, position = -1, attitude = -1, velocity = -1, dissipated = -1;
@@ -58,7 +57,7 @@ struct PlaceMotionInSpace {
 };
 
 /// Energies [J] and momenta (inertial axes; angular about the mass centre).
-struct TreeBalance {
+struct Balance {
   double kinetic = 0, elastic = 0, potential = 0;  // potential: of gravity
   double dissipated = 0, work = 0;                 // since the start
 
@@ -130,6 +129,10 @@ class Tree {
   void jacobian(double t, const double* y, std::span<const char> contact, TreeWorkspace&, Eigen::MatrixXd& J,
                 std::span<const LawBranch> laws = {}) const;
 
+  /// Columns of it, from `first` on: as many as `columns` has, and as many rows of them.
+  void jacobian_columns(double t, const double* y, std::span<const char> contact, TreeWorkspace&, int first,
+                        Eigen::Ref<Eigen::MatrixXd> columns, std::span<const LawBranch> laws = {}) const;
+
   /// Joints with a stop, and where they are: coordinate less threshold, its rate.
   const std::vector<int>& stops() const;
   double gap(const double* y, int joint) const { return y[layout().joints[static_cast<size_t>(joint)].scalar]; }
@@ -138,8 +141,8 @@ class Tree {
   }
 
   /// Of a state with what is prescribed at t as prescribed; the second form imposes that.
-  TreeBalance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y, TreeWorkspace&) const;
-  TreeBalance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y) const;
+  Balance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y, TreeWorkspace&) const;
+  Balance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y) const;
   PlaceMotionInSpace motion(double t, const Eigen::Ref<const Eigen::VectorXd>& y, const Place&) const;
   std::vector<JointLoad> joint_loads(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
                                      std::span<const char> contact, std::span<const LawBranch> laws = {}) const;

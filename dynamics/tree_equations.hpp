@@ -95,7 +95,7 @@ void condense_link(const Link& link, const T* y, LinkScratch<T>& s, bool forces)
       o.Gt[k] = Vec3<T>{};
       for (size_t l = 0; l < n; ++l) o.Gt[k] += inverse.row(k)[l] * o.Ct[l];
     }
-    eliminate_modes(inverse, o.Ct, o.Gt, nullptr, s);
+    eliminate_modes<T, T>(inverse, o.Ct, o.Gt, nullptr, s);
     if (link.slots) add_hung_children(link, inverse, o.Gt, s);
   } else {
     const InverseOfMe<double> inverse = inverse_of_Me(link.body);
@@ -231,18 +231,23 @@ void hand_to_parent(const Link& link, LinkScratch<T>& s, LinkScratch<T>& parent)
     add_shifted(s.A, link.a.position, I, parent.I);
 }
 
+/// Accelerations of the modes from that of the body's origin, where place b does not move.
+template <class C, class T>
+void release_fixed(const std::vector<Vec3<C>>& Gt, LinkScratch<T>& s) {
+  s.acceleration = s.handle;
+  const Vec3<T> a = s.acceleration.t, alpha = s.acceleration.w;
+  for (size_t k = 0; k < Gt.size(); ++k) s.q_ddot[k] = s.modes.g[k] - (dot(Gt[k], a) + dot(s.modes.Gw[k], alpha));
+}
+
 /// Accelerations of the modes and of the body's origin from that of place b.
 template <class T>
 void release_modes(const Link& link, LinkScratch<T>& s) {
   const auto n = static_cast<size_t>(link.body.n);
   if (!link.b.moves()) {
-    s.acceleration = s.handle;
-    const Vec3<T> a = s.acceleration.t, alpha = s.acceleration.w;
     if (link.second_order)
-      for (size_t k = 0; k < n; ++k)
-        s.q_ddot[k] = s.modes.g[k] - (dot(s.second_order.Gt[k], a) + dot(s.modes.Gw[k], alpha));
+      release_fixed(s.second_order.Gt, s);
     else
-      for (size_t k = 0; k < n; ++k) s.q_ddot[k] = s.modes.g[k] - (dot(link.body.Gt[k], a) + dot(s.modes.Gw[k], alpha));
+      release_fixed(link.body.Gt, s);
     const std::array<T, 6> A = entries(s.acceleration);
     for (size_t i = 0; i < static_cast<size_t>(link.slots); ++i) {
       std::array<T, 6> F;
@@ -320,13 +325,68 @@ void release_link(const Model& model, const Link& link, const LinkScratch<T>* pa
   for (size_t k = 0; k < static_cast<size_t>(link.body.n); ++k) y_dot[link.q_dot + static_cast<int>(k)] = s.q_ddot[k];
 }
 
+/// Articulated inertia of leaves with their joints, handed to their parent.
+inline void condense_leaves(const Leaves& leaves, const Model& model, std::span<const char> contact,
+                            std::vector<LinkScratch<double>>& links, LeavesScratch& scratch) {
+  LinkScratch<Quad>& s = scratch.link;
+  const equations::BodyOf<Quad>& b = leaves.body;
+  s.I = {};
+  add_body(b, scratch.q.data(), scratch.q_dot.data(), s);
+  if (model.scene->field) {
+    s.I.ft += s.external.t;
+    s.I.fw += s.external.w;
+    for (size_t k = 0; k < scratch.q.size(); ++k) s.modes.b[k] += s.external_modal[k];
+  }
+  if (b.n) eliminate_modes(inverse_of_Me(b), b.Ct, b.Gt, &b.Ctt, s);
+  if (leaves.kind == JointKind::hinge) {
+    Quad closed;
+    for (int i = 0; i < Quad::width; ++i) {
+      const Link& link = model.links[static_cast<size_t>(leaves.link[static_cast<size_t>(i)])];
+      set_lane(closed, i, contact[static_cast<size_t>(link.joint)] ? 1.0 : 0.0);
+    }
+    eliminate_freedom(Freedom::turn_z, 0, equations::hinge_torque(b, scratch.gap, scratch.rate, closed), s);
+  }
+  if (leaves.parent < 0) return;
+  HubSystem<Quad> I = s.I, at_parent{};
+  const Twist<Quad> f = I * s.bias;
+  I.ft -= f.t;
+  I.fw -= f.w;
+  add_shifted(s.A, leaves.position, I, at_parent);
+  links[static_cast<size_t>(leaves.parent)].I += sum(at_parent, leaves.count);
+}
+
+/// Leaves after their parent: their accelerations.
+inline void release_leaves(const Leaves& leaves, const Model& model, const std::vector<LinkScratch<double>>& links,
+                           LeavesScratch& scratch, double* y_dot) {
+  LinkScratch<Quad>& s = scratch.link;
+  s.base = s.bias;
+  if (leaves.parent >= 0) {
+    const Twist<double>& parent = links[static_cast<size_t>(leaves.parent)].acceleration;
+    const Vec3<Quad> alpha = four(parent.w);
+    s.base.t += transposed_product(s.A, four(parent.t) - cross(leaves.position, alpha));
+    s.base.w += transposed_product(s.A, alpha);
+  }
+  s.handle = s.base;
+  Quad acceleration;
+  if (leaves.kind == JointKind::hinge) acceleration = release_freedom(Freedom::turn_z, 0, s);
+  release_fixed(leaves.body.Gt, s);
+  for (int i = 0; i < leaves.count; ++i) {
+    const Link& link = model.links[static_cast<size_t>(leaves.link[static_cast<size_t>(i)])];
+    if (link.rate >= 0) y_dot[link.rate] = lane(acceleration, i);
+    for (size_t k = 0; k < s.q_ddot.size(); ++k) y_dot[static_cast<size_t>(link.q_dot) + k] = lane(s.q_ddot[k], i);
+  }
+}
+
 /// All accelerations, from what move_links left; external loads already in the scratch.
 template <class T>
 void accelerate(const Model& model, const T* y, const Instant& instant, std::span<const char> contact,
                 Scratch<T>& scratch, T* y_dot) {
-  const size_t count = model.links.size();
   for (LinkScratch<T>& s : scratch.links) s.I = {};
-  for (size_t i = count; i-- > 0;) {
+  if constexpr (has_leaves<T>)
+    for (size_t i = 0; i < scratch.leaves.size(); ++i)
+      condense_leaves(model.leaves[i], model, contact, scratch.links, scratch.leaves[i]);
+  for (size_t place = scratch.singles.size(); place-- > 0;) {
+    const size_t i = scratch.singles[place];
     const Link& link = model.links[i];
     LinkScratch<T>& s = scratch.links[i];
     condense_link(link, y, s, model.forces);
@@ -337,11 +397,14 @@ void accelerate(const Model& model, const T* y, const Instant& instant, std::spa
     eliminate_freedoms(link, mechanism_load(link, y, instant.drives[i], law, closed), s);
     if (link.parent >= 0) hand_to_parent(link, s, scratch.links[static_cast<size_t>(link.parent)]);
   }
-  for (size_t i = 0; i < count; ++i) {
+  for (const size_t i : scratch.singles) {
     const Link& link = model.links[i];
     release_link(model, link, link.parent < 0 ? nullptr : &scratch.links[static_cast<size_t>(link.parent)],
                  scratch.links[i], y_dot);
   }
+  if constexpr (has_leaves<T>)
+    for (size_t i = 0; i < scratch.leaves.size(); ++i)
+      release_leaves(model.leaves[i], model, scratch.links, scratch.leaves[i], y_dot);
 }
 
 }  // namespace flexboom::tree

@@ -69,19 +69,33 @@ void pull_spring(const Model& model, const SpringModel& spring, const T* y, Scra
   scratch.loss += spring.damping * (rate * rate);
 }
 
-/// Gravity of a field on a link: m a + G mc, mc x a + axial(G J), Ct^T a - 1/2 G : dJ/dq_k. In derivatives the field
-/// stays what it is at the link's place: it changes over the size of an orbit.
-template <class T>
-void pull_by_field(const Link& link, const OrbitalField& field, double t, const T* y, LinkScratch<T>& s, T& power) {
-  const Eigen::Vector3d place(value_of(s.R0.x), value_of(s.R0.y), value_of(s.R0.z));
-  const LocalGravity gravity = field.at(t, place);
-  const equations::Gravity<T> in_space = {equations::lift<T>(spatial::vec3(gravity.acceleration)),
-                                          equations::lift<T>(spatial::sym3(gravity.gradient))};
+/// The field at a place, or at four.
+inline equations::Gravity<double> gravity_at(const OrbitalField& field, double t, const Vec3<double>& place) {
+  const LocalGravity g = field.at(t, spatial::eigen(place));
+  return {spatial::vec3(g.acceleration), spatial::sym3(g.gradient)};
+}
+inline equations::Gravity<Quad> gravity_at(const OrbitalField& field, double t, const Vec3<Quad>& places) {
+  equations::Gravity<Quad> r;
+  for (int i = 0; i < Quad::width; ++i) {
+    equations::Gravity<double> g =
+        gravity_at(field, t, Vec3<double>{lane(places.x, i), lane(places.y, i), lane(places.z, i)});
+    for (int c = 0; c < 3; ++c) set_lane(component(r.acceleration, c), i, component(g.acceleration, c));
+    for (int c = 0; c < 6; ++c) set_lane(component(r.gradient, c), i, component(g.gradient, c));
+  }
+  return r;
+}
+
+/// Gravity of a field on a body: m a + G mc, mc x a + axial(G J), Ct^T a - 1/2 G : dJ/dq_k. In derivatives the field
+/// stays what it is at the body's place: it changes over the size of an orbit.
+template <class C, class T>
+void pull_by_field(const equations::BodyOf<C>& body, const OrbitalField& field, double t, const T* q, const T* q_dot,
+                   LinkScratch<T>& s, T& power) {
+  const auto gravity = gravity_at(field, t, Vec3<C>{value_of(s.R0.x), value_of(s.R0.y), value_of(s.R0.z)});
+  const equations::Gravity<T> in_space = {equations::lift<T>(gravity.acceleration),
+                                          equations::lift<T>(gravity.gradient)};
   const equations::Gravity<T> here = in_space.at(Vec3<T>{}, s.A0);
   const Vec3<T>& a = here.acceleration;
   const Sym3<T>& G = here.gradient;
-  const equations::Body& body = link.body;
-  const T *q = y + link.q, *q_dot = y + link.q_dot;
   const equations::Inertia<T> inertia = equations::inertia_at(body, q, q_dot, s.modes);
   const Vec3<T> force = T(body.m) * a + G * inertia.mc;
   const Vec3<T> torque = cross(inertia.mc, a) + equations::gradient_torque(G, inertia.J);
@@ -93,18 +107,37 @@ void pull_by_field(const Link& link, const OrbitalField& field, double t, const 
     power += modal * q_dot[k];
   }
   const T g[] = {G.xx, G.yy, G.zz, 2.0 * G.xy, 2.0 * G.yz, 2.0 * G.zx};
-  for (const equations::Term& term : body.J1)
+  for (const equations::TermOf<C>& term : body.J1)
     s.external_modal[static_cast<size_t>(term.k)] -= 0.5 * term.value * g[term.component];
-  for (const equations::Term& term : body.J2)
+  for (const equations::TermOf<C>& term : body.J2)
     s.external_modal[static_cast<size_t>(term.k)] -= term.value * q[term.l] * g[term.component];
+}
+
+/// On all bodies.
+template <class T>
+void pull_by_field(const Model& model, const OrbitalField& field, double t, const T* y, Scratch<T>& scratch) {
+  for (const size_t i : scratch.singles) {
+    const Link& link = model.links[i];
+    pull_by_field(link.body, field, t, y + link.q, y + link.q_dot, scratch.links[i], scratch.power);
+  }
+  if constexpr (has_leaves<T>) {
+    for (size_t i = 0; i < scratch.leaves.size(); ++i) {
+      LeavesScratch& s = scratch.leaves[i];
+      Quad power;
+      s.link.external = {};
+      for (Quad& f : s.link.external_modal) f = 0;
+      pull_by_field(model.leaves[i].body, field, t, s.q.data(), s.q_dot.data(), s.link, power);
+      scratch.power += sum(power, model.leaves[i].count);
+    }
+  }
 }
 
 /// Sums all external loads of the links.
 template <class T>
 void apply_forces(const Model& model, const T* y, const Instant& instant, Scratch<T>& scratch) {
-  for (LinkScratch<T>& s : scratch.links) {
-    s.external = {};
-    for (T& f : s.external_modal) f = T(0.0);
+  for (const size_t i : scratch.singles) {
+    scratch.links[i].external = {};
+    for (T& f : scratch.links[i].external_modal) f = T(0.0);
   }
   for (size_t i = 0; i < model.loads.size(); ++i) {
     const PlaceInSpace<T> at = find_place(model, model.loads[i], y, scratch, scratch.U);
@@ -113,9 +146,7 @@ void apply_forces(const Model& model, const T* y, const Instant& instant, Scratc
     at.push(force, torque);
     scratch.power += dot(force, at.velocity) + dot(torque, at.omega);
   }
-  if (const auto& field = model.scene->field)
-    for (size_t i = 0; i < model.links.size(); ++i)
-      pull_by_field(model.links[i], *field, instant.time, y, scratch.links[i], scratch.power);
+  if (const auto& field = model.scene->field) pull_by_field(model, *field, instant.time, y, scratch);
   for (const SpringModel& spring : model.springs) pull_spring(model, spring, y, scratch);
   for (size_t i = 0; i < model.wheels.size(); ++i) {  // torque of the rotor, and its momentum turned with the body
     LinkScratch<T>& s = scratch.links[static_cast<size_t>(model.wheels[i].link)];
@@ -144,11 +175,40 @@ T drive_load(const Link& link, int i, const T* y, const Instant::Drive& drive, c
   return i == 0 ? load - mechanism_load(link, y, drive, law, contact) : load;
 }
 
+/// Power that structural damping takes.
+template <class C, class T>
+T structural_loss(const equations::BodyOf<C>& b, const T* q_dot) {
+  const auto n = static_cast<size_t>(b.n);
+  T loss(0.0);
+  for (size_t k = 0; k < n; ++k) {
+    T force(0.0);
+    for (size_t l = b.row_begin(k); l < b.row_end(k); ++l) force += b.De[k * n + l] * q_dot[l];
+    loss += q_dot[k] * force;
+  }
+  return loss;
+}
+
+/// The rates of what leaves have beside accelerations.
+inline void follow_leaves(const Leaves& leaves, const Model& model, const LeavesScratch& s, double* y_dot,
+                          double& loss) {
+  const Quad in_dampers = leaves.body.damping * (s.rate * s.rate);
+  for (int i = 0; i < leaves.count; ++i) {
+    const Link& link = model.links[static_cast<size_t>(leaves.link[static_cast<size_t>(i)])];
+    if (link.scalar >= 0) y_dot[link.scalar] = lane(s.rate, i);
+    y_dot[link.dissipated] = lane(in_dampers, i);
+    for (size_t k = 0; k < s.q.size(); ++k) y_dot[static_cast<size_t>(link.q) + k] = lane(s.q_dot[k], i);
+  }
+  loss += sum(structural_loss(leaves.body, s.q_dot.data()), leaves.count);
+}
+
 /// The rates of everything that is no acceleration.
 template <class T>
 void follow(const Model& model, const T* y, const Instant& instant, std::span<const char> contact, Scratch<T>& scratch,
             T* y_dot) {
-  for (size_t i = 0; i < model.links.size(); ++i) {
+  if constexpr (has_leaves<T>)
+    for (size_t i = 0; i < scratch.leaves.size(); ++i)
+      follow_leaves(model.leaves[i], model, scratch.leaves[i], y_dot, scratch.loss);
+  for (const size_t i : scratch.singles) {
     const Link& link = model.links[i];
     const LinkScratch<T>& s = scratch.links[i];
     const equations::Body& b = link.body;
@@ -172,16 +232,8 @@ void follow(const Model& model, const T* y, const Instant& instant, std::span<co
       for (int k = 0; k < static_cast<int>(law_losses.size()); ++k)
         y_dot[link.losses + k] = law.power(static_cast<LawLoss>(k), joint.x[0], joint.rate[0]);
     }
-    const T* v = y + link.q_dot;
-    const auto n = static_cast<size_t>(b.n);
-    T loss = T(0.0);
-    for (size_t k = 0; k < n; ++k) {
-      y_dot[link.q + static_cast<int>(k)] = v[k];
-      T force = T(0.0);
-      for (size_t l = b.row_begin(k); l < b.row_end(k); ++l) force += b.De[k * n + l] * v[l];
-      loss += v[k] * force;
-    }
-    scratch.loss += loss;
+    for (int k = 0; k < b.n; ++k) y_dot[link.q + k] = y[link.q_dot + k];
+    scratch.loss += structural_loss(b, y + link.q_dot);
   }
   for (size_t i = 0; i < model.wheels.size(); ++i) {
     const LinkScratch<T>& s = scratch.links[static_cast<size_t>(model.wheels[i].link)];

@@ -156,29 +156,20 @@ equations::Inertia<T> second_order_body(const Link& link, const Vec3<T>& w, cons
   return inertia;
 }
 
-/// The body alone at rest of its modes: inertia, and the forces of its motion; fills mc, J, Cr and the modal forces.
-template <class T>
-void add_body(const Link& link, const T* y, LinkScratch<T>& s) {
-  const equations::Body& b = link.body;
-  const auto n = static_cast<size_t>(b.n);
-  const T *q = y + link.q, *q_dot = y + link.q_dot;
+/// Adds mass m, inertia and the forces of the motion to s.I; fills mc and J. After Cr.
+template <class C, class T>
+void add_inertia(const C& mass, const equations::Inertia<T>& inertia, const std::vector<Vec3<C>>& Ct, const T* q_dot,
+                 const BiasForce<T>& bias, LinkScratch<T>& s) {
   const Vec3<T>& w = s.w;
-  equations::Inertia<T> inertia;
-  BiasForce<T> bias;
   Vec3<T> Ct_rate{}, Cr_rate{};
-  if (link.second_order) {
-    inertia = second_order_body(link, w, q, q_dot, s.second_order, s.modes, bias);
-    for (size_t k = 0; k < n; ++k) Ct_rate += q_dot[k] * s.second_order.Ct[k];
-  } else {
-    inertia = equations::inertia_at(b, q, q_dot, s.modes);
-    equations::modal_forces(b, w, q, q_dot, s.modes);
-    for (size_t k = 0; k < n; ++k) Ct_rate += q_dot[k] * b.Ct[k];
+  for (size_t k = 0; k < Ct.size(); ++k) {
+    Ct_rate += q_dot[k] * Ct[k];
+    Cr_rate += q_dot[k] * s.modes.Cr[k];
   }
-  for (size_t k = 0; k < n; ++k) Cr_rate += q_dot[k] * s.modes.Cr[k];
   s.mc = inertia.mc;
   s.J = inertia.J;
   const Vec3<T>& c = s.mc;
-  const T zero(0.0), m(b.m);
+  const T zero(0.0), m(mass);
   HubSystem<T> I = s.I;  // a copy, so that the compiler may keep it in registers
   I.tt += Sym3<T>{m, m, m, zero, zero, zero};
   I.ww += inertia.J;
@@ -188,6 +179,25 @@ void add_body(const Link& link, const T* y, LinkScratch<T>& s) {
   I.ft += bias.t - cross(w, cross(w, c) + 2.0 * Ct_rate);
   I.fw += bias.w - (cross(w, inertia.J * w + Cr_rate) + inertia.J_dot * w);
   s.I = I;
+}
+
+/// A body at rest of its modes, by shapes that are constant: inertia, and the forces of its motion; fills mc, J, Cr and
+/// the modal forces.
+template <class C, class T>
+void add_body(const equations::BodyOf<C>& b, const T* q, const T* q_dot, LinkScratch<T>& s) {
+  const equations::Inertia<T> inertia = equations::inertia_at(b, q, q_dot, s.modes);
+  equations::modal_forces(b, s.w, q, q_dot, s.modes);
+  add_inertia(b.m, inertia, b.Ct, q_dot, BiasForce<T>{}, s);
+}
+
+/// The same of a link, whatever its shapes.
+template <class T>
+void add_body(const Link& link, const T* y, LinkScratch<T>& s) {
+  const T *q = y + link.q, *q_dot = y + link.q_dot;
+  if (!link.second_order) return add_body(link.body, q, q_dot, s);
+  BiasForce<T> bias;
+  const equations::Inertia<T> inertia = second_order_body(link, s.w, q, q_dot, s.second_order, s.modes, bias);
+  add_inertia(T(link.body.m), inertia, s.second_order.Ct, q_dot, bias, s);
 }
 
 /// The inverse of a mass matrix Me, n x n: constant, or that of this moment. Row k of it is zero outside begin .. end.
@@ -202,14 +212,15 @@ struct InverseOfMe {
   const C* row(size_t k) const { return values + k * n; }
 };
 
-inline InverseOfMe<double> inverse_of_Me(const equations::Body& b) {
+template <class C>
+InverseOfMe<C> inverse_of_Me(const equations::BodyOf<C>& b) {
   return {b.Me_inverse.data(), static_cast<size_t>(b.n), b.diagonal};
 }
 
 /// Eliminates q_ddot by Me^-1. `Ctt`: Ct Me^-1 Ct^T where it is constant, else null.
 template <class T, class C>
 void eliminate_modes(const InverseOfMe<C>& inverse, const std::vector<Vec3<C>>& Ct, const std::vector<Vec3<C>>& Gt,
-                     const Sym3<double>* Ctt, LinkScratch<T>& s) {
+                     const Sym3<C>* Ctt, LinkScratch<T>& s) {
   const size_t n = inverse.n;
   equations::BodyScratch<T>& modes = s.modes;
   HubSystem<T> I = s.I;
@@ -231,7 +242,7 @@ void eliminate_modes(const InverseOfMe<C>& inverse, const std::vector<Vec3<C>>& 
     I.fw -= g * w;
   }
   if (Ctt != nullptr) {
-    const Sym3<double>& c = *Ctt;
+    const Sym3<C>& c = *Ctt;
     I.tt += Sym3<T>{T(-c.xx), T(-c.yy), T(-c.zz), T(-c.xy), T(-c.yz), T(-c.zx)};
   } else {
     for (size_t k = 0; k < n; ++k) {

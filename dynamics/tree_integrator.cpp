@@ -1,11 +1,11 @@
 #include "dynamics/tree_integrator.hpp"
 
 #include "dynamics/conservation.hpp"
+#include "dynamics/error_scales.hpp"
 #include "dynamics/event_loop.hpp"
 #include "dynamics/ode.hpp"
 #include "dynamics/split.hpp"
 #include "fem/check.hpp"
-#include "fem/dense.hpp"
 
 #include <fmt/format.h>
 
@@ -19,66 +19,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// What each state's error is measured against: the largest value so far of its group, and no less than a small part
-/// of the body's size (lengths, deflections), of a radian, and of these in the time they take.
-class TreeScales {
- public:
-  TreeScales(const Tree& tree, const VectorXd& y0, double tolerance) : tree_(tree) {
-    error_.tolerance = tolerance;
-    const TreeLayout& l = tree.layout();
-    double length = 0;
-    for (const ReducedBody& b : tree.scene().bodies) length = std::max(length, std::sqrt(b.J0.trace() / b.m));
-    error_.scale = VectorXd::Constant(l.size, part * std::max(length, 1.0));
-    const double energy = std::abs(tree.balance(0, y0).kinetic) + std::abs(tree.balance(0, y0).elastic);
-    for (int i = l.dissipated; i < l.size; ++i) error_.scale[i] = std::max(energy, part);
-    for (size_t i = 0; i < l.joints.size(); ++i) {
-      const TreeLayout::Joint& j = l.joints[i];
-      const int scalars = joint_type(tree.scene().joints[i].kind).scalars;
-      for (int k = 0; k < scalars; ++k)
-        groups_.push_back({j.scalar + k, 1}), groups_.push_back({l.rate(j.scalar + k), 1});
-      for (const int at : {j.omega, j.position, j.velocity})
-        if (at >= 0) groups_.push_back({at, 3});
-      // A quaternion's entries are near 1: less than its round-off can not be asked for.
-      if (j.attitude >= 0) error_.scale.segment<4>(j.attitude).setConstant(1.0);
-    }
-    for (size_t b = 0; b < l.q.size(); ++b) {
-      const ReducedBody& body = tree.scene().bodies[b];
-      for (int k = 0; k < body.n(); ++k) {
-        const double size = part * length * std::sqrt(body.m / body.Me(k, k));
-        error_.scale[l.q[b] + k] = size;
-        error_.scale[l.rate(l.q[b] + k)] = size * std::sqrt(body.Ke(k, k) / body.Me(k, k));
-        groups_.push_back({l.q[b] + k, 1}), groups_.push_back({l.rate(l.q[b] + k), 1});
-      }
-    }
-    for (size_t i = 0; i < tree.scene().wheels.size(); ++i) groups_.push_back({l.spin + static_cast<int>(i), 1});
-    observe(y0);
-  }
-
-  const ErrorScale& error() const { return error_; }
-
-  void observe(const VectorXd& y) {
-    for (const Group& g : groups_) {
-      const double size = y.segment(g.first, g.count).norm();
-      for (int i = g.first; i < g.first + g.count; ++i) error_.scale[i] = std::max(error_.scale[i], size);
-    }
-    const TreeLayout& l = tree_.layout();
-    for (int i = l.dissipated; i < l.size; ++i) error_.scale[i] = std::max(error_.scale[i], std::abs(y[i]));
-  }
-
-  /// Errors of a state are weighed against no less than this.
-  void raise(int state, double size) { error_.scale[state] = std::max(error_.scale[state], size); }
-
- private:
-  static constexpr double part = 1e-5;
-  struct Group {
-    int first, count;
-  };
-
-  const Tree& tree_;
-  std::vector<Group> groups_;
-  ErrorScale error_;
-};
-
 std::vector<Stop> stops_of(const Tree& tree) {
   std::vector<Stop> stops;
   for (const int joint : tree.stops()) {
@@ -88,18 +28,54 @@ std::vector<Stop> stops_of(const Tree& tree) {
   return stops;
 }
 
+/// Does exponential collocation suit a flight? By how long its steps become beside the fastest linear motion, in its
+/// first steps.
+class Pilot {
+ public:
+  /// After a step. @throws Unsuitable.
+  void observe(double step, double fastest) {
+    if (suits_) return;
+    turned_ = std::max(turned_, step * fastest), fastest_ = fastest;
+    suits_ = turned_ >= enough;
+    if (!suits_ && ++steps_ == steps) throw Unsuitable{fastest};
+  }
+  std::string why() const {
+    return suits_ ? fmt::format("its steps pass {:.2g} rad of the fastest motion, {:.3g} rad/s", turned_, fastest_)
+                  : "the flight takes few steps";
+  }
+
+  /// No failure: nothing of the flight is kept.
+  struct Unsuitable {
+    double fastest;  // [rad/s]
+    std::string why() const {
+      return fmt::format("what is nonlinear sets the steps: no linear motion is faster than {:.2g} rad/s", fastest);
+    }
+  };
+
+ private:
+  static constexpr int steps = 50;
+  static constexpr double enough =
+      0.1;  // of a radian: shorter steps are those of any method, and others do less in one
+  int steps_ = 0;
+  double turned_ = 0, fastest_ = 0;
+  bool suits_ = false;
+};
+
 class TreeFlight final : public Flight<TreeTrajectory> {
  public:
   TreeFlight(const Tree& tree, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method,
-             const Checkpoint<TreeTrajectory>& so_far)
+             const Checkpoint<TreeTrajectory>& so_far, Pilot* pilot = nullptr)
       : Flight(options, so_far, stops_of(tree), tree.scene().joints.size(), Laws(tree.scene().joints, options)),
         tree_(tree),
-        scales_(tree, y0, method.local_share * options.tolerance),
+        scales_(tree, y0, method.local_share * options.tolerance, options.rescale_at_events),
         ode_(ode_of(tree, laws_)),
         stepper_(method.make != nullptr ? method.make(ode_of(tree, laws_), scales_.error())
                                         : method.make_split(split(tree), scales_.error())),
         exact_in_linear_part_(method.make_split != nullptr),
+        pilot_(pilot),
         work_(tree.workspace()),
+        has_stiffening_(
+            std::ranges::any_of(tree.scene().bodies, [](const ReducedBody& b) { return !b.Kg.spin.empty(); })),
         effect_(tree.scene().bodies.size()),
         y_dot_(y0.size()),
         flags_(contacts_.closed()),
@@ -107,7 +83,8 @@ class TreeFlight final : public Flight<TreeTrajectory> {
         crossed_(contacts_.size() + laws_.switches().size(), 0) {
     y_ = y0;
     result_.summary.method = method.name;
-    for (size_t i = 0; i < contacts_.size(); ++i) scales_.raise(scalar(i), contacts_.largest_gap(i));
+    for (size_t i = 0; i < contacts_.size() && !options.rescale_at_events; ++i)
+      scales_.raise(scalar(i), contacts_.largest_gap(i));
     contacts_.begin(*this);
     laws_.begin(*this, t_, result_.events);
   }
@@ -197,10 +174,18 @@ class TreeFlight final : public Flight<TreeTrajectory> {
       all.insert(all.end(), laws.begin(), laws.end());
     };
     both(contacts_.closed(), laws_.sides(), flags_), both(contacts_.armed(), laws_.armed(), armed_);
+    const bool starts = t_ == options_.start;
+    if (!starts) {
+      for (const TreeLayout::Joint& j : tree_.layout().joints)
+        if (j.attitude >= 0) y_.segment<4>(j.attitude).normalize();
+      scales_.restart(y_);
+    }
     stepper_->restart(t_, y_, flags_, armed_);
+    if (starts) stepper_->predict(options_.duration, [this](const VectorXd& y) { scales_.predict(y); });
   }
   void step(double limit, double& t, VectorXd& y) override {
     stepper_->step(limit, t, y, crossed_);
+    if (pilot_ != nullptr) pilot_->observe(t - t_, stepper_->fastest());
     const auto stops = static_cast<std::ptrdiff_t>(contacts_.size());
     std::copy(crossed_.begin(), crossed_.begin() + stops, contacts_.crossed().begin());
     std::copy(crossed_.begin() + stops, crossed_.end(), laws_.crossed().begin());
@@ -229,6 +214,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
 
   /// At every output of a short list, at some of a long one: an eigenvalue problem for each body.
   void look_at_stiffening(double t, const VectorXd& y) {
+    if (!has_stiffening_) return;
     const double outputs = (options_.duration - options_.start) / options_.output_step;
     const auto stride = static_cast<size_t>(outputs / 500) + 1;
     if (result_.time.size() % stride != 0) return;
@@ -242,7 +228,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     IntegrationSummary& s = result_.summary;
     add_counts(stepper_->counts(), s);
     Conservation kept(tree_.scene().bodies, options_.largest);
-    for (const TreeBalance& b : result_.balance)
+    for (const Balance& b : result_.balance)
       kept.add(
           b.energy(),
           std::max({b.kinetic + std::abs(b.elastic), std::abs(b.work), b.dissipated, digits * std::abs(b.potential)}),
@@ -256,11 +242,13 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   }
 
   const Tree& tree_;
-  TreeScales scales_;
+  ErrorScales scales_;
   std::unique_ptr<Ode> ode_;
   std::unique_ptr<Stepper> stepper_;
   bool exact_in_linear_part_;
+  Pilot* pilot_;
   TreeWorkspaceHandle work_;
+  bool has_stiffening_;                    // has any body a Kg?
   std::vector<LargestStiffening> effect_;  // per body
   VectorXd y_dot_, blow_;                  // blow: change of the state per impulse
   std::vector<double> hold_of_blow_;       // per joint
@@ -322,56 +310,6 @@ std::vector<char> closed_stops(const Tree& tree, const Eigen::Ref<const VectorXd
   return closed;
 }
 
-namespace {
-
-struct MethodChoice {
-  std::string name, why;
-};
-
-/// Of a method for this start: by how long the steps of exponential collocation become beside the fastest vibration,
-/// in its first steps.
-MethodChoice choose_method(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o) {
-  constexpr int pilot_steps = 50;
-  constexpr double enough = 0.1;  // of a radian: shorter steps are those of any method, and others do less in a step
-  const IntegratorMethod& exponential = integrator_method("exponential");
-  TreeScales scales(tree, y0, exponential.local_share * o.tolerance);
-  std::vector<char> closed, armed(tree.stops().size(), 0);
-  for (const int joint : tree.stops()) closed.push_back(tree.gap(y0.data(), joint) > 0);
-  double end = o.duration;
-  for (const double corner : o.corners)
-    if (corner > o.start) end = std::min(end, corner);
-  try {
-    const std::unique_ptr<SplitProblem> problem = split(tree);
-    const SplitLayout& layout = problem->layout();
-    VectorXd at_rest = y0;
-    for (const SplitLayout::Coordinate& c : layout.coordinates) at_rest[c.rate] = 0;
-    for (const SplitLayout::Turn& turn : layout.turns) at_rest.segment<3>(turn.omega).setZero();
-    const RealEigenvectors eigen = eigenvectors(problem->linear(o.start, at_rest.data(), closed));
-    const double fastest = std::sqrt((eigen.real.cwiseAbs2() + eigen.imaginary.cwiseAbs2()).maxCoeff());
-    const std::unique_ptr<Stepper> stepper = exponential.make_split(split(tree), scales.error());
-    stepper->restart(o.start, y0, closed, armed);
-    double t = o.start, turned = 0;
-    VectorXd y = y0;
-    std::vector<int> crossed(closed.size());
-    for (int i = 0; i < pilot_steps && t < end && turned < enough; ++i) {
-      const double before = t;
-      stepper->step(end, t, y, crossed);
-      scales.observe(y);
-      turned = std::max(turned, (t - before) * fastest);
-    }
-    if (turned >= enough)
-      return {"exponential",
-              fmt::format("its steps pass {:.2g} rad of the fastest motion, {:.3g} rad/s", turned, fastest)};
-    const bool cheap = layout.x <= 12;  // an evaluation costs less than what a multistep method does beside it
-    return {cheap ? "erk" : "adams",
-            fmt::format("what is nonlinear sets the steps: no linear motion is faster than {:.2g} rad/s", fastest)};
-  } catch (const std::exception& failure) {
-    return {"bdf", fmt::format("exponential collocation cannot: {}", failure.what())};
-  }
-}
-
-}  // namespace
-
 TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o,
                          const Checkpoint<TreeTrajectory>& so_far) {
   check_options(o, tree.scene().joints.size());
@@ -382,18 +320,26 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
           fmt::format("method '{}' simulates no laws of joints; 'adams', 'bdf', 'dirk' and 'erk' do", o.method));
   VectorXd start = y0;
   tree.impose(o.start, start);
-  if (o.method != "auto") return TreeFlight(tree, start, o, integrator_method(o.method), so_far).fly();
-  MethodChoice choice = has_laws ? MethodChoice{"bdf", "joints have laws"} : choose_method(tree, start, o);
-  TreeTrajectory result;
+  const auto fly = [&](const std::string& method, const std::string& why) {
+    TreeTrajectory r = TreeFlight(tree, start, o, integrator_method(method), so_far).fly();
+    r.summary.why_method = why;
+    return r;
+  };
+  if (o.method != "auto") return fly(o.method, "");
+  if (has_laws) return fly("bdf", "joints have laws");
   try {
-    result = TreeFlight(tree, start, o, integrator_method(choice.name), so_far).fly();
+    Pilot pilot;
+    TreeTrajectory r = TreeFlight(tree, start, o, integrator_method("exponential"), so_far, &pilot).fly();
+    r.summary.why_method = pilot.why();
+    return r;
+  } catch (const Pilot::Unsuitable& reason) {
+    const bool cheap = tree.layout().p + tree.layout().u <= 12;  // less than what a multistep method does beside it
+    return fly(cheap ? "erk" : "adams", reason.why());
   } catch (const MethodFailure& failure) {
-    if (choice.name != "exponential") throw;
-    choice = {"bdf", fmt::format("exponential collocation could not: {}", failure.what())};
-    result = TreeFlight(tree, start, o, integrator_method(choice.name), so_far).fly();
+    return fly("bdf", fmt::format("exponential collocation could not: {}", failure.what()));
+  } catch (const InputError& failure) {
+    return fly("bdf", fmt::format("exponential collocation cannot: {}", failure.what()));
   }
-  result.summary.why_method = choice.why;
-  return result;
 }
 
 std::vector<Stiffening> stiffening_where_it_counts(const Multibody& scene, const TreeState& state, double duration,

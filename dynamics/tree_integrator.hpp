@@ -27,7 +27,7 @@ std::vector<char> closed_stops(const Tree&, const Eigen::Ref<const Eigen::Vector
 struct TreeTrajectory {
   std::vector<double> time;
   std::vector<Eigen::VectorXd> y;  // Tree::layout(), prescribed coordinates as prescribed
-  std::vector<TreeBalance> balance;
+  std::vector<Balance> balance;
   std::vector<std::vector<LawBranch>> laws;  // per joint; empty where no joint has a law
   std::vector<StopEvent> events;
   IntegrationSummary summary;                        // momentum_drift: unknown where something holds or pushes
@@ -39,7 +39,6 @@ struct TreeTrajectory {
 std::vector<LargestStiffening> largest_stiffening(const Tree&, const TreeTrajectory&);
 
 /// Flies the tree from y0. Method "auto": the one that suits its start, and bdf where that fails.
-/// `rescale_at_events` is not heard: errors are measured against the largest motion so far.
 /// @throws InputError for an unknown method or bad options; NumericalError when the method fails.
 TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const IntegratorOptions&,
                          const Checkpoint<TreeTrajectory>& = {});

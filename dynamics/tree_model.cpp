@@ -243,6 +243,7 @@ PlacedOn packed_place(const Model& model, const Place& place, const std::string&
 Model packed_model(const Multibody& scene, const std::vector<Stiffening>& stiffening, TreeLayout& layout) {
   require(stiffening.size() == 1 || stiffening.size() == scene.bodies.size(),
           "geometric stiffness: one choice for all bodies or one per body is needed");
+  require(!scene.bodies.empty(), "there is no body: nothing moves");
   check(scene);
   const std::vector<int> carrier = carriers(scene), order = order_of(scene, carrier);
   Model model;
@@ -262,6 +263,7 @@ Model packed_model(const Multibody& scene, const std::vector<Stiffening>& stiffe
   }
   lay_out(scene, model, layout);
   add_forces(scene, model);
+  place_side_by_side(model);
   return model;
 }
 

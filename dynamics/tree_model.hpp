@@ -3,8 +3,10 @@
 // What Tree computes with: the scene packed for the inner loop. Internal to `dynamics`.
 
 #include "dynamics/equations.hpp"
+#include "dynamics/quad.hpp"
 #include "dynamics/tree.hpp"
 
+#include <array>
 #include <vector>
 
 namespace flexboom::tree {
@@ -55,6 +57,18 @@ struct Link {
   Mat3<double> brf_axes;
 };
 
+/// Two to four bodies that hang on one parent by joints of one kind, hinges or fixed ones, carry nothing, and have
+/// equally many modes: computed side by side.
+struct Leaves {
+  equations::BodyOf<Quad> body;
+  JointKind kind = JointKind::hinge;
+  int parent = -1;      // link; -1: the inertial frame
+  Vec3<Quad> position;  // places a, in the parent's frame
+  Mat3<Quad> axes;
+  std::array<int, Quad::width> link{};  // lanes that are left over repeat the last body
+  int count = 0;
+};
+
 struct PlacedOn {
   int link = -1;
   PlaceModel at;
@@ -66,7 +80,9 @@ struct SpringModel {
 };
 
 struct Model {
-  std::vector<Link> links;
+  std::vector<Link> links;              // parents first
+  std::vector<Leaves> leaves;           // some of them again
+  std::vector<size_t> singles;          // the others
   std::vector<PlacedOn> loads, wheels;  // a wheel's axis is at.position
   std::vector<SpringModel> springs;
   Vec3<double> gravity;
@@ -78,6 +94,9 @@ struct Model {
 
 /// @throws InputError as Tree::Tree.
 Model packed_model(const Multibody&, const std::vector<Stiffening>&, TreeLayout&);
+
+/// Sets `leaves` and `singles`.
+void place_side_by_side(Model&);
 
 /// A place in the frame of its link.
 PlacedOn packed_place(const Model&, const Place&, const std::string& of);

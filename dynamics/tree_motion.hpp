@@ -185,13 +185,68 @@ void pose_link(const Link& link, const LinkScratch<T>* parent, LinkScratch<T>& s
   s.A0 = A, s.R0 = R, s.v0 = v;
 }
 
+/// Takes the state of leaves.
+inline void load(const Leaves& leaves, const Model& model, const double* y, LeavesScratch& s) {
+  for (int i = 0; i < Quad::width; ++i) {
+    const Link& link = model.links[static_cast<size_t>(leaves.link[static_cast<size_t>(i)])];
+    if (link.scalar >= 0) set_lane(s.gap, i, y[link.scalar]), set_lane(s.rate, i, y[link.rate]);
+    for (size_t k = 0; k < s.q.size(); ++k) {
+      set_lane(s.q[k], i, y[static_cast<size_t>(link.q) + k]);
+      set_lane(s.q_dot[k], i, y[static_cast<size_t>(link.q_dot) + k]);
+    }
+  }
+}
+
+/// Leaves after their parent, as move_link.
+inline void move_leaves(const Leaves& leaves, const Model& model, const LinkScratch<double>* parent,
+                        LeavesScratch& scratch) {
+  LinkScratch<Quad>& s = scratch.link;
+  s.arm = leaves.position;
+  s.A = leaves.axes;
+  if (leaves.kind == JointKind::hinge) {
+    const equations::BodyOf<Quad>& b = leaves.body;
+    const Quad c = cos(scratch.gap), sine = sin(scratch.gap);
+    s.A = turned_z(s.A, b.cos_threshold * c - b.sin_threshold * sine, b.sin_threshold * c + b.cos_threshold * sine);
+  }
+  if (parent == nullptr) {
+    s.w = s.bias.w = {};
+    s.bias.t = -transposed_product(s.A, four(model.gravity));
+  } else {
+    const Vec3<Quad> w = four(parent->w);
+    s.w = transposed_product(s.A, w);
+    s.bias.t = transposed_product(s.A, cross(w, cross(w, leaves.position)));
+    s.bias.w = {scratch.rate * s.w.y, -(scratch.rate * s.w.x), 0.0};
+  }
+  s.w.z += scratch.rate;
+}
+
+/// As pose_link.
+inline void pose_leaves(const LinkScratch<double>* parent, LinkScratch<Quad>& s) {
+  s.A0 = s.A, s.R0 = s.arm, s.v0 = {};
+  if (parent == nullptr) return;
+  const Mat3<Quad> A = four(parent->A0);
+  s.A0 = product(A, s.A);
+  s.R0 = four(parent->R0) + A * s.arm;
+  s.v0 = four(parent->v0) + A * cross(four(parent->w), s.arm);
+}
+
 template <class T>
 void move_links(const Model& model, const T* y, const Instant& instant, bool poses, Scratch<T>& scratch) {
-  for (size_t i = 0; i < model.links.size(); ++i) {
+  const auto parent_of = [&scratch](int parent) {
+    return parent < 0 ? nullptr : &scratch.links[static_cast<size_t>(parent)];
+  };
+  for (const size_t i : scratch.singles) {
     const Link& link = model.links[i];
-    LinkScratch<T>* parent = link.parent < 0 ? nullptr : &scratch.links[static_cast<size_t>(link.parent)];
-    move_link(model, link, y, instant.drives[i], parent, scratch.links[i]);
-    if (poses) pose_link(link, parent, scratch.links[i]);
+    move_link(model, link, y, instant.drives[i], parent_of(link.parent), scratch.links[i]);
+    if (poses) pose_link(link, parent_of(link.parent), scratch.links[i]);
+  }
+  if constexpr (has_leaves<T>) {
+    for (size_t i = 0; i < scratch.leaves.size(); ++i) {
+      const Leaves& leaves = model.leaves[i];
+      load(leaves, model, y, scratch.leaves[i]);
+      move_leaves(leaves, model, parent_of(leaves.parent), scratch.leaves[i]);
+      if (poses) pose_leaves(parent_of(leaves.parent), scratch.leaves[i].link);
+    }
   }
 }
 

@@ -21,6 +21,7 @@ struct Twist {
 };
 
 inline double value_of(double a) { return a; }
+inline Quad value_of(const Quad& a) { return a; }
 template <int N>
 double value_of(const Dual<N>& a) {
   return a.v;
@@ -66,16 +67,35 @@ struct RotationFunctions {
   }
 };
 
+template <class T, class C>
+Mat3<T> lift(const Mat3<C>& a) {
+  return {{equations::lift<T>(a.row[0]), equations::lift<T>(a.row[1]), equations::lift<T>(a.row[2])}};
+}
+
+/// Four times the same.
+inline Vec3<Quad> four(const Vec3<double>& a) { return equations::lift<Quad>(a); }
+inline Mat3<Quad> four(const Mat3<double>& a) { return lift<Quad>(a); }
+
+/// The sum of the first `count` lanes.
+inline Vec3<double> sum(const Vec3<Quad>& a, int count) {
+  return {flexboom::sum(a.x, count), flexboom::sum(a.y, count), flexboom::sum(a.z, count)};
+}
+inline Sym3<double> sum(const Sym3<Quad>& a, int count) {
+  using flexboom::sum;
+  return {sum(a.xx, count), sum(a.yy, count), sum(a.zz, count), sum(a.xy, count), sum(a.yz, count), sum(a.zx, count)};
+}
+inline equations::HubSystem<double> sum(const equations::HubSystem<Quad>& a, int count) {
+  equations::HubSystem<double> r;
+  r.tt = sum(a.tt, count), r.ww = sum(a.ww, count), r.ft = sum(a.ft, count), r.fw = sum(a.fw, count);
+  for (size_t i = 0; i < 3; ++i) r.tw.row[i] = sum(a.tw.row[i], count);
+  return r;
+}
+
 template <class T, class S>
 Mat3<T> product(const Mat3<T>& a, const Mat3<S>& b) {
   Mat3<T> r;
   for (size_t i = 0; i < 3; ++i) r.row[i] = a.row[i].x * b.row[0] + a.row[i].y * b.row[1] + a.row[i].z * b.row[2];
   return r;
-}
-
-template <class T>
-Mat3<T> lift(const Mat3<double>& a) {
-  return {{equations::lift<T>(a.row[0]), equations::lift<T>(a.row[1]), equations::lift<T>(a.row[2])}};
 }
 
 /// A place relative to the frame of its body, in that frame: accelerations are those that remain when q_ddot is zero.

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 namespace flexboom::tree {
@@ -82,21 +84,50 @@ struct Instant {
   std::vector<double> wheels;        // torques
   std::span<const LawBranch> laws;   // per joint; empty: none does anything
 
+  explicit Instant(const Model& model)
+      : drives(model.links.size()), loads(model.loads.size()), wheels(model.wheels.size()) {}
+
   const LawBranch& law(const Link& link) const {
     static constexpr LawBranch nothing;
     return !link.law || laws.empty() ? nothing : laws[static_cast<size_t>(link.joint)];
   }
 };
 
+/// Of bodies side by side: their part of the state, and what a link has.
+struct LeavesScratch {
+  Quad gap, rate;              // of their hinges
+  std::vector<Quad> q, q_dot;  // n
+  LinkScratch<Quad> link;
+
+  explicit LeavesScratch(int size) : q(static_cast<size_t>(size)), q_dot(q.size()) {
+    link.modes = equations::BodyScratch<Quad>(q.size());
+    link.external_modal.resize(q.size()), link.q_ddot.resize(q.size());
+  }
+};
+
+/// Leaves are computed side by side for values alone: derivatives have their own registers.
+template <class T>
+inline constexpr bool has_leaves = std::is_same_v<T, double>;
+
 template <class T>
 struct Scratch {
   std::vector<LinkScratch<T>> links;
-  std::vector<Twist<T>> U, U_other;  // of a place
-  T loss{}, power{};                 // outside the joints; of loads, wheels and drives [W]
+  std::vector<size_t> singles;        // links that are computed one by one
+  std::vector<LeavesScratch> leaves;  // the others
+  std::vector<Twist<T>> U, U_other;   // of a place
+  T loss{}, power{};                  // outside the joints; of loads, wheels and drives [W]
 
-  explicit Scratch(const Model& model) : links(model.links.size()) {
+  /// side_by_side: are leaves? Then their links have nothing.
+  explicit Scratch(const Model& model, bool side_by_side = has_leaves<T>) : links(model.links.size()) {
+    if (side_by_side) {
+      singles = model.singles;
+      for (const Leaves& l : model.leaves) leaves.emplace_back(l.body.n);
+    } else {
+      singles.resize(links.size());
+      std::iota(singles.begin(), singles.end(), size_t{0});
+    }
     size_t most = 0;
-    for (size_t i = 0; i < links.size(); ++i) {
+    for (const size_t i : singles) {
       const Link& link = model.links[i];
       LinkScratch<T>& s = links[i];
       const auto n = static_cast<size_t>(link.body.n), k = static_cast<size_t>(link.slots);

@@ -4,7 +4,6 @@
 
 #include "apps/simulate.hpp"
 #include "apps/tree_flight.hpp"
-#include "dynamics/hub_flight.hpp"
 
 #include <Eigen/Core>
 
@@ -13,27 +12,20 @@
 
 namespace flexboom {
 
-/// A scene whose tree is a hub with hinged booms, and its start.
-struct HubInFlight {
-  explicit HubInFlight(const Scene& given) : HubInFlight(with_joints(given), prepared(with_joints(given))) {}
+/// A scene, its tree and its start.
+struct SceneInFlight {
+  explicit SceneInFlight(const Scene& given) : SceneInFlight(with_joints(given), prepared(with_joints(given))) {}
 
-  /// Columns of a flight.
-  OutputTable outputs(const IntegratorOptions& o) const {
-    return output_table(scene, tree, integrate(tree, *hub_of(tree), first_state(scene, tree), o));
-  }
+  TreeTrajectory fly(const IntegratorOptions& o) const { return integrate(tree, y0, o); }
+  OutputTable outputs(const IntegratorOptions& o) const { return output_table(scene, tree, fly(o)); }
 
   Scene scene;
   Tree tree;
-  System system;
-  Eigen::VectorXd y0;  // System::layout()
+  Eigen::VectorXd y0;
 
  private:
-  HubInFlight(Scene s, const std::vector<PreparedBody>& bodies)
-      : scene(std::move(s)), tree(make_multibody(scene, bodies)), system(std::move(hub_of(tree)->system)) {
-    const Eigen::VectorXd start = first_state(scene, tree);
-    y0 = Eigen::VectorXd::Zero(system.layout().size);
-    y0.head(system.layout().dissipated()) = start.head(system.layout().dissipated());
-  }
+  SceneInFlight(Scene s, const std::vector<PreparedBody>& bodies)
+      : scene(std::move(s)), tree(make_multibody(scene, bodies)), y0(first_state(scene, tree)) {}
   static std::vector<PreparedBody> prepared(const Scene& scene) {
     std::vector<PreparedBody> bodies;
     for (const BodyScene& b : scene.bodies) bodies.push_back(prepare_body(b));
@@ -41,18 +33,22 @@ struct HubInFlight {
   }
 };
 
-inline HubInFlight sport(int modes) {
+inline SceneInFlight sport(int modes) {
   Scene scene = load_scene("sport");
   for (BodyScene& b : scene.bodies) b.structure = "eq14", b.modes = modes;
-  return HubInFlight(scene);
+  return SceneInFlight(scene);
 }
 
 /// A state in the middle of the motion.
-inline Eigen::VectorXd moving_state(const HubInFlight& f) {
+inline Eigen::VectorXd moving_state(const SceneInFlight& f) {
   IntegratorOptions o;
+  o.method = "exponential";
   o.tolerance = 1e-6;
   o.duration = 0.12;
-  return integrate(f.system, f.y0, o).y.back();
+  return f.fly(o).y.back();
 }
+
+/// No stop is closed.
+inline std::vector<char> all_open(const SceneInFlight& f) { return std::vector<char>(f.tree.scene().joints.size(), 0); }
 
 }  // namespace flexboom

@@ -1,6 +1,6 @@
-// Speed of trees: SPORT beside System in one run, chains of flexible links by their length, bodies by their modes.
+// Speed of trees: chains of flexible links by their length, bodies by their modes, stars by their booms.
 
-#include "dynamics/multibody_of.hpp"
+#include "dynamics/hub_with_booms.hpp"
 #include "dynamics/tree_integrator.hpp"
 
 #include "reduction/eq14.hpp"
@@ -9,37 +9,14 @@
 #include <benchmark/benchmark.h>
 
 #include <cmath>
+#include <functional>
+#include <numbers>
 
 namespace {
 
 using namespace flexboom;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-void SportBySystem(benchmark::State& state) {
-  const HubInFlight f = sport(static_cast<int>(state.range(0)));
-  const VectorXd y = moving_state(f);
-  VectorXd y_dot(y.size());
-  const std::vector<char> contact(4, 0);
-  const auto work = f.system.workspace();
-  for (auto _ : state) f.system.derivative(y.data(), contact, *work, y_dot.data());
-}
-BENCHMARK(SportBySystem)->Arg(2)->Arg(8);
-
-void SportByTree(benchmark::State& state) {
-  const HubInFlight f = sport(static_cast<int>(state.range(0)));
-  const Tree tree(multibody_of(f.system));
-  const VectorXd of_system = moving_state(f);
-  VectorXd y = VectorXd::Zero(tree.layout().size), y_dot(y.size()), expected(of_system.size());
-  const Eigen::Index n = of_system.size() - 2;  // all but the energies
-  y.head(n) = of_system.head(n);
-  const std::vector<char> contact(5, 0);
-  const auto work = tree.workspace();
-  for (auto _ : state) tree.derivative(0, y.data(), contact, *work, y_dot.data());
-  f.system.derivative(of_system.data(), std::vector<char>(4, 0), *f.system.workspace(), expected.data());
-  state.counters["difference_from_system"] = (y_dot.head(n) - expected.head(n)).norm() / expected.norm();
-}
-BENCHMARK(SportByTree)->Arg(2)->Arg(8);
 
 /// Flexible links of some modes, each hinged to the tip of the one before, random deflections.
 Tree chain(int links, int modes) {
@@ -78,16 +55,40 @@ BENCHMARK(ChainByLinks)->RangeMultiplier(2)->Range(1, 64)->Complexity();
 void ChainByModes(benchmark::State& state) { run(state, chain(4, static_cast<int>(state.range(0)))); }
 BENCHMARK(ChainByModes)->RangeMultiplier(2)->Range(2, 64)->Complexity();
 
+/// Booms of so many modes on a free hub.
+Tree star(int booms, const std::function<int(int boom)>& modes) {
+  std::vector<Appendage> appendages;
+  for (int i = 0; i < booms; ++i) {
+    const ReducedBody boom = eq14::reduced_body({1.0, 0.5, 2000.0}, modes(i), eq14::Planes::xy, "boom");
+    const double angle = 2 * std::numbers::pi * i / booms;
+    const Vector3d out(std::cos(angle), std::sin(angle), 0);
+    appendages.push_back(
+        {boom, {.point = out, .stowed = Vector3d::UnitZ(), .outward = out, .mechanism = {0.1, 1.5, 0.01, 10, 1.6}}});
+  }
+  return Tree(hub_with_booms(rigid_body("hub", 100, Vector3d::Zero(), 50 * Eigen::Matrix3d::Identity()), appendages));
+}
+
+/// Equal booms are computed side by side.
+void StarOfEqualBooms(benchmark::State& state) {
+  run(state, star(static_cast<int>(state.range(0)), [](int) { return 8; }));
+}
+BENCHMARK(StarOfEqualBooms)->RangeMultiplier(4)->Range(1, 64)->Complexity();
+
+/// No two have equally many modes; eight in the mean.
+void StarOfUnequalBooms(benchmark::State& state) {
+  const auto booms = static_cast<int>(state.range(0));
+  run(state,
+      star(booms, [booms](int i) { return booms == 1 ? 8 : static_cast<int>(std::lround(16.0 * i / (booms - 1))); }));
+}
+BENCHMARK(StarOfUnequalBooms)->Arg(4)->Arg(16);
+
 void JacobianOfSport(benchmark::State& state) {
-  const HubInFlight f = sport(2);
-  const Tree tree(multibody_of(f.system));
-  VectorXd y = VectorXd::Zero(tree.layout().size);
-  const VectorXd of_system = moving_state(f);
-  y.head(of_system.size() - 2) = of_system.head(of_system.size() - 2);
+  const SceneInFlight f = sport(2);
+  const VectorXd y = moving_state(f);
   Eigen::MatrixXd J;
-  const auto work = tree.workspace();
-  const std::vector<char> contact(5, 0);
-  for (auto _ : state) tree.jacobian(0, y.data(), contact, *work, J);
+  const auto work = f.tree.workspace();
+  const std::vector<char> contact = all_open(f);
+  for (auto _ : state) f.tree.jacobian(0, y.data(), contact, *work, J);
 }
 BENCHMARK(JacobianOfSport);
 

@@ -1,3 +1,5 @@
+#include "dynamics/hub_with_booms.hpp"
+#include "dynamics/ode.hpp"
 #include "tree_testing.hpp"
 
 #include <gtest/gtest.h>
@@ -37,17 +39,19 @@ TEST(Allocation, IsCounted) {
 TEST(Allocation, RightHandSideJacobianAndNewtonSolveMakeNone) {
   Appendage a{eq14::reduced_body(testing::round_boom(0.295, 0.005), 3, eq14::Planes::xy_and_xz, "boom"), {}};
   a.hinge.mechanism = testing::sport_mechanism(0.35);
-  const System system(rigid_body("hub", 8.5, Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()), {a, a});
-  const auto work = system.workspace();
-  const Eigen::VectorXd y = system.pack(system.at_rest({1.5, 1.5}));
+  const Tree tree(hub_with_booms(rigid_body("hub", 8.5, Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()), {a, a}));
+  const Laws no_laws;
+  const std::unique_ptr<Ode> ode = ode_of(tree, no_laws);
+  const Eigen::VectorXd y = tree.pack(tree.at_rest());
   Eigen::VectorXd y_dot(y.size());
   const std::vector<char> contact = {0, 1};
-  const long before = allocations;
+  long before = 0;
   for (int i = 0; i < 10; ++i) {
-    system.derivative(y.data(), contact, *work, y_dot.data());
-    system.jacobian(y.data(), contact, *work);
-    system.factorise_newton(1e-3, *work);
-    system.solve_newton(y_dot.data(), *work, y_dot.data());
+    if (i == 1) before = allocations;  // the first makes room
+    ode->derivative(0, y.data(), contact, y_dot.data());
+    ode->jacobian(0, y.data(), contact);
+    ode->factorise(1e-3);
+    ode->solve(y_dot.data(), y_dot.data());
   }
   EXPECT_EQ(allocations - before, 0);
 }

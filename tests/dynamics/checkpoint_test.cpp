@@ -1,10 +1,9 @@
 // What is told of a flight on its way, and where it fails; and motions that die out before they reach a stop.
 
 #include "dynamics/formulations.hpp"
-#include "dynamics/multibody_of.hpp"
 #include "dynamics/tree_integrator.hpp"
-#include "dynamics_testing.hpp"
 #include "fem/check.hpp"
+#include "hub_testing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,6 +17,7 @@ namespace {
 
 using Eigen::Vector3d;
 using Eigen::VectorXd;
+using testing::Hub;
 
 using std::numbers::pi;
 
@@ -34,46 +34,18 @@ struct SeenMotion : Motion {
 };
 
 using Look = std::function<void(const SeenMotion&)>;
-using Engine = Motion (*)(const System&, const VectorXd& y0, IntegratorOptions, const Look&);
+using Engine = Motion (*)(const Hub&, const VectorXd& y0, IntegratorOptions, const Look&);
 
 template <class Events>
 void add_events(const Events& events, Motion& m) {
   for (const auto& e : events) m.contacts.push_back(e.contact), m.contact_times.push_back(e.time);
 }
 
-Motion by_system(const System& system, const VectorXd& y0, IntegratorOptions o, const Look& look) {
-  const auto seen = [&](const Trajectory& r) {
-    SeenMotion m;
-    m.time = r.time;
-    for (const VectorXd& y : r.y) m.gap.push_back(system.gap(y.data(), 0));
-    add_events(r.events, m);
-    m.end = r.y.back(), m.stops = r.summary.stops;
-    return m;
-  };
-  Checkpoint<Trajectory> told;
-  if (look)
-    told = [&](const Trajectory& r, size_t outputs) {
-      SeenMotion m = seen(r);
-      m.outputs = outputs;
-      look(m);
-    };
-  return seen(integrate(system, y0, o, told));
-}
-
-template <const char* method>
-Motion by_method(const System& system, const VectorXd& y0, IntegratorOptions o, const Look& look) {
-  o.method = method;
-  return by_system(system, y0, o, look);
-}
-
-/// The hub does not move: both layouts are the same up to the energies.
-Motion by_tree(const System& system, const VectorXd& y0, IntegratorOptions o, const Look& look) {
-  o.method = "bdf";
-  const Tree tree(multibody_of(system));
+Motion by_tree(const Hub& system, const VectorXd& y0, IntegratorOptions o, const Look& look) {
   const auto seen = [&](const TreeTrajectory& r) {
     SeenMotion m;
     m.time = r.time;
-    for (const VectorXd& y : r.y) m.gap.push_back(y[0]);
+    for (const VectorXd& y : r.y) m.gap.push_back(system.gap(y.data(), 0));
     add_events(r.events, m);
     m.end = r.y.back(), m.stops = r.summary.stops;
     return m;
@@ -85,14 +57,18 @@ Motion by_tree(const System& system, const VectorXd& y0, IntegratorOptions o, co
       m.outputs = outputs;
       look(m);
     };
-  VectorXd start = VectorXd::Zero(tree.layout().size);
-  start.head(system.layout().dissipated()) = y0.head(system.layout().dissipated());
-  return seen(integrate(tree, start, o, told));
+  return seen(integrate(system.tree(), y0, o, told));
 }
 
-Motion by_multipliers(const System& system, const VectorXd& y0, IntegratorOptions o, const Look& look) {
-  const Tree tree(multibody_of(system));
-  const Multipliers multipliers(multibody_of(system));
+template <const char* method>
+Motion by_method(const Hub& system, const VectorXd& y0, IntegratorOptions o, const Look& look) {
+  o.method = method;
+  return by_tree(system, y0, o, look);
+}
+
+Motion by_multipliers(const Hub& system, const VectorXd& y0, IntegratorOptions o, const Look& look) {
+  const Tree& tree = system.tree();
+  const Multipliers multipliers(tree.scene());
   const double threshold = system.appendages()[0].hinge.mechanism.threshold;
   const auto seen = [&](const MultibodyTrajectory& r) {
     SeenMotion m;
@@ -110,11 +86,9 @@ Motion by_multipliers(const System& system, const VectorXd& y0, IntegratorOption
       m.outputs = outputs;
       look(m);
     };
-  VectorXd start = VectorXd::Zero(tree.layout().size);
-  start.head(system.layout().dissipated()) = y0.head(system.layout().dissipated());
   MultipliersOptions of_flight{o};
-  of_flight.angles = {start[0] + threshold};
-  return seen(integrate_multipliers(multipliers, body_states(tree, o.start, start), of_flight, told));
+  of_flight.angles = {y0[0] + threshold};
+  return seen(integrate_multipliers(multipliers, body_states(tree, o.start, y0), of_flight, told));
 }
 
 constexpr char exponential[] = "exponential", bdf[] = "bdf", adams[] = "adams", dirk[] = "dirk", erk[] = "erk";
@@ -127,12 +101,11 @@ class EveryEngine : public ::testing::TestWithParam<Row> {};
 INSTANTIATE_TEST_SUITE_P(Table, EveryEngine,
                          ::testing::Values(Row{"exponential", by_method<exponential>}, Row{"bdf", by_method<bdf>},
                                            Row{"adams", by_method<adams>}, Row{"dirk", by_method<dirk>},
-                                           Row{"erk", by_method<erk>}, Row{"tree", by_tree},
-                                           Row{"multipliers", by_multipliers}),
+                                           Row{"erk", by_method<erk>}, Row{"multipliers", by_multipliers}),
                          [](const auto& row) { return std::string(row.param.name); });
 
 /// A boom of SPORT on a hub that does not move.
-System boom(HingeMechanism mechanism, int modes) {
+Hub boom(HingeMechanism mechanism, int modes) {
   const double m = 0.01645016453235955, J = 0.0004772175595249452;
   ReducedBody body =
       modes == 0
@@ -141,10 +114,10 @@ System boom(HingeMechanism mechanism, int modes) {
   if (modes > 0) apply_damping(body, {"modal", 0.05});
   Hinge hinge;
   hinge.mechanism = mechanism;
-  return System(ReducedBody{}, {{std::move(body), hinge}}, true);
+  return Hub({}, {{std::move(body), hinge}});
 }
 
-System bouncing_boom() { return boom(testing::sport_mechanism(0.35), 0); }
+Hub bouncing_boom() { return boom(testing::sport_mechanism(0.35), 0); }
 
 IntegratorOptions short_flight() {
   IntegratorOptions o;
@@ -154,10 +127,10 @@ IntegratorOptions short_flight() {
   return o;
 }
 
-VectorXd start_of(const System& system) { return system.pack(system.at_rest({pi / 2 - pi / 60})); }
+VectorXd start_of(const Hub& system) { return system.pack(system.at_rest({pi / 2 - pi / 60})); }
 
 TEST_P(EveryEngine, ACheckpointAtEveryStepChangesNothing) {
-  const System system = bouncing_boom();
+  const Hub system = bouncing_boom();
   IntegratorOptions o = short_flight();
   const Motion alone = GetParam().fly(system, start_of(system), o, {});
   o.checkpoint_every = 0;
@@ -182,7 +155,7 @@ TEST_P(EveryEngine, ACheckpointAtEveryStepChangesNothing) {
 
 // From wherever a flight was seen it goes on to the same end by the same contacts.
 TEST_P(EveryEngine, EveryCheckpointIsAStart) {
-  const System system = bouncing_boom();
+  const Hub system = bouncing_boom();
   IntegratorOptions o = short_flight();
   o.checkpoint_every = 0;
   std::vector<SeenMotion> seen;
@@ -207,7 +180,7 @@ TEST_P(EveryEngine, EveryCheckpointIsAStart) {
 }
 
 TEST_P(EveryEngine, AFailureTellsHowFarItCame) {
-  const System system = bouncing_boom();
+  const Hub system = bouncing_boom();
   IntegratorOptions o = short_flight();
   const Motion whole = GetParam().fly(system, start_of(system), o, {});
   o.max_steps = 20;
@@ -229,7 +202,7 @@ TEST_P(EveryEngine, AMotionThatDiesOutBeforeTheStopMakesNoContact) {
     if (c.modes > 0 && GetParam().name == std::string("erk")) continue;  // a million steps
     HingeMechanism mechanism = testing::sport_mechanism(0.35);
     mechanism.damping = c.damping;
-    const System system = boom(mechanism, c.modes);
+    const Hub system = boom(mechanism, c.modes);
     IntegratorOptions o;
     o.tolerance = c.tolerance, o.settle = c.settle;
     o.duration = 20 * (c.damping / 0.03) * (c.damping / 0.03);  // to e^-100 and beyond

@@ -1,7 +1,8 @@
 #pragma once
 
-#include "dynamics/system.hpp"
+#include "dynamics/hinge.hpp"
 #include "reduction/eq14.hpp"
+#include "reduction/reduced_body.hpp"
 
 #include <Eigen/Core>
 

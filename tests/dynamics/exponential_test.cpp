@@ -1,10 +1,10 @@
 #include "dynamics/collocation.hpp"
-#include "dynamics/integrator.hpp"
 #include "dynamics/linear_part.hpp"
 #include "dynamics/phi.hpp"
+#include "dynamics/tree_integrator.hpp"
 
-#include "dynamics_testing.hpp"
 #include "fem/check.hpp"
+#include "hub_testing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,6 +18,9 @@ using Eigen::Matrix2d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
+using testing::Hub;
+using testing::HubLayout;
+using testing::HubState;
 using Complex = std::complex<double>;
 
 using std::numbers::pi;
@@ -176,7 +179,7 @@ TEST(LinearPart, WithoutAFullSetOfEigenvectorsIsRefused) {
   EXPECT_THROW(LinearPart(jordan, {}, VectorXd::Zero(1)), NumericalError);
 }
 
-System sport_boom(int modes, double stiffness_scale = 1) {
+Hub sport_boom(int modes, double stiffness_scale = 1) {
   ReducedBody body = eq14::reduced_body(testing::round_boom(0.295, 0.005), modes, eq14::Planes::xy, "boom");
   apply_damping(body, {"modal", 0.05});
   Hinge hinge;
@@ -184,7 +187,7 @@ System sport_boom(int modes, double stiffness_scale = 1) {
   hinge.mechanism.stiffness *= stiffness_scale;
   hinge.point = Vector3d(0.05, 0.1, 0.02);
   ReducedBody hub = rigid_body("hub", 8.5, Vector3d::Zero(), Vector3d(0.13, 0.1, 0.06).asDiagonal());
-  return System(hub, {{body, hinge}});
+  return Hub(hub, {{body, hinge}});
 }
 
 IntegratorOptions exponential_options(double tolerance, double duration) {
@@ -197,28 +200,28 @@ IntegratorOptions exponential_options(double tolerance, double duration) {
 
 // A hinge that nothing pulls back, on a free hub: the eigenvectors of L are short of one.
 TEST(Exponential, AHingeWithoutASpringTurnsOn) {
-  const System system = sport_boom(1, 0);
-  State s = system.at_rest({pi / 2 - 0.5});
+  const Hub system = sport_boom(1, 0);
+  HubState s = system.at_rest({pi / 2 - 0.5});
   s.rate[0] = -0.3;
   const VectorXd y0 = system.pack(s);
   IntegratorOptions o = exponential_options(1e-9, 3);
-  const Trajectory r = integrate(system, y0, o);
+  const TreeTrajectory r = integrate(system, y0, o);
   o.method = "bdf";
-  const Trajectory reference = integrate(system, y0, o);
+  const TreeTrajectory reference = integrate(system, y0, o);
   for (size_t i = 0; i < r.time.size(); ++i) EXPECT_NEAR(r.y[i][0], reference.y[i][0], 2e-8);
   EXPECT_LT(r.summary.momentum_drift, 1e-8);
 }
 
 // Large angles and rates: the linear part at rest is a poor guide, and the answer is the same.
 TEST(Exponential, AgreesWithBdfFarFromWhereItWasLinearised) {
-  const System system = sport_boom(2);
-  State s = system.at_rest({pi / 2 - 1.2});
+  const Hub system = sport_boom(2);
+  HubState s = system.at_rest({pi / 2 - 1.2});
   s.omega = Vector3d(1, -2, 1.5);
   const VectorXd y0 = system.pack(s);
   IntegratorOptions o = exponential_options(1e-9, 2);
-  const Trajectory r = integrate(system, y0, o);
+  const TreeTrajectory r = integrate(system, y0, o);
   o.method = "bdf";
-  const Trajectory reference = integrate(system, y0, o);
+  const TreeTrajectory reference = integrate(system, y0, o);
   VectorXd size = VectorXd::Zero(y0.size()), error = size;
   for (size_t i = 0; i < r.time.size(); ++i) {
     size = size.cwiseMax(reference.y[i].cwiseAbs());
@@ -231,19 +234,19 @@ TEST(Exponential, AgreesWithBdfFarFromWhereItWasLinearised) {
 // What is far from linear is as good as asked for, and a coarse answer costs less.
 TEST(Exponential, ErrorIsThatOfTheTolerance) {
   for (const bool fixed_hub : {false, true}) {
-    const System free = sport_boom(2), fixed(ReducedBody{}, free.appendages(), true);
-    const System& system = fixed_hub ? fixed : free;
-    State s = system.at_rest({pi / 2 - 1.2});
+    const Hub free = sport_boom(2), fixed({}, free.appendages());
+    const Hub& system = fixed_hub ? fixed : free;
+    HubState s = system.at_rest({pi / 2 - 1.2});
     if (fixed_hub)
       s.rate[0] = -30;
     else
       s.omega = Vector3d(1, -2, 1.5);
     const VectorXd y0 = system.pack(s);
-    const Trajectory reference = integrate(system, y0, exponential_options(1e-11, 0.5));
+    const TreeTrajectory reference = integrate(system, y0, exponential_options(1e-11, 0.5));
     const auto shape = [&](const VectorXd& y) { return y.head(system.layout().p + system.layout().u); };
     long steps = 0;
     for (const double tolerance : {1e-3, 1e-5, 1e-7, 1e-9}) {
-      const Trajectory r = integrate(system, y0, exponential_options(tolerance, 0.5));
+      const TreeTrajectory r = integrate(system, y0, exponential_options(tolerance, 0.5));
       EXPECT_GT(r.summary.steps, steps) << tolerance;
       steps = r.summary.steps;
       VectorXd size = VectorXd::Zero(shape(y0).size()), error = size;
@@ -259,14 +262,14 @@ TEST(Exponential, ErrorIsThatOfTheTolerance) {
 
 // A coarse tolerance takes steps that are longer than a contact.
 TEST(Exponential, LongStepsMissNoContact) {
-  const System system = sport_boom(2);
+  const Hub system = sport_boom(2);
   const VectorXd y0 = system.pack(system.at_rest({pi / 2 - pi / 60}));
   IntegratorOptions fine = exponential_options(1e-9, 3);
-  const Trajectory reference = integrate(system, y0, fine);
+  const TreeTrajectory reference = integrate(system, y0, fine);
   for (const double tolerance : {1e-2, 1e-3, 1e-4}) {
     IntegratorOptions o = exponential_options(tolerance, 3);
     o.settle = 1e-11;
-    const Trajectory r = integrate(system, y0, o);
+    const TreeTrajectory r = integrate(system, y0, o);
     ASSERT_GT(reference.events.size(), 20U);
     for (size_t k = 0; k < 20; ++k) EXPECT_NEAR(r.events[k].time, reference.events[k].time, tolerance) << k;
   }
@@ -276,15 +279,15 @@ TEST(Exponential, LongStepsMissNoContact) {
 TEST(Exponential, MoreModesDoNotShrinkTheStep) {
   long steps_with_2 = 0;
   for (const int modes : {2, 4, 8, 16}) {
-    const System system = sport_boom(modes);
+    const Hub system = sport_boom(modes);
     const VectorXd y0 = system.pack(system.at_rest({pi / 2 - pi / 60}));
-    const Trajectory r = integrate(system, y0, exponential_options(1e-4, 3));
+    const TreeTrajectory r = integrate(system, y0, exponential_options(1e-4, 3));
     if (modes == 2) steps_with_2 = r.summary.steps;
     EXPECT_LT(10 * r.summary.steps, 13 * steps_with_2) << modes;
     EXPECT_LT(r.summary.energy_balance, 1e-4);
     // The hub, which all the modes shake, is as good as ever.
-    const Trajectory reference = integrate(system, y0, exponential_options(1e-8, 3));
-    const Layout& l = system.layout();
+    const TreeTrajectory reference = integrate(system, y0, exponential_options(1e-8, 3));
+    const HubLayout& l = system.layout();
     for (const int place : {l.position(), l.attitude() + 1}) {
       double size = 0, error = 0;
       for (size_t i = 0; i < r.time.size(); ++i) {
@@ -298,13 +301,13 @@ TEST(Exponential, MoreModesDoNotShrinkTheStep) {
 
 // The momenta stay what they were at the start, whatever the tolerance.
 TEST(Exponential, KeepsMomentaAtAnyTolerance) {
-  const System system = sport_boom(4);
-  State s = system.at_rest({pi / 2 - 1.2});
+  const Hub system = sport_boom(4);
+  HubState s = system.at_rest({pi / 2 - 1.2});
   for (const double tolerance : {1e-2, 1e-4, 1e-7})
     for (const Vector3d& omega : {Vector3d(0, 0, 0), Vector3d(0.3, -0.2, 0.5)}) {
       s.omega = omega;
       s.velocity = Vector3d(0.1, 0.2, -0.3);
-      const Trajectory r = integrate(system, system.pack(s), exponential_options(tolerance, 2));
+      const TreeTrajectory r = integrate(system, system.pack(s), exponential_options(tolerance, 2));
       EXPECT_GT(r.events.size(), 4U);
       // Where a step ends: the correction leaves its own square.
       const Balance &first = r.balance.front(), &last = r.balance.back();
@@ -317,14 +320,14 @@ TEST(Exponential, KeepsMomentaAtAnyTolerance) {
 
 // Shape and rates do not know how far the hub is, or how fast.
 TEST(Exponential, PlaceDoesNotActBack) {
-  const System system = sport_boom(4);
-  State s = system.at_rest({pi / 2 - pi / 60});
-  const Trajectory here = integrate(system, system.pack(s), exponential_options(1e-9, 2));
+  const Hub system = sport_boom(4);
+  HubState s = system.at_rest({pi / 2 - pi / 60});
+  const TreeTrajectory here = integrate(system, system.pack(s), exponential_options(1e-9, 2));
   s.position = Vector3d(1e7, -2e7, 3e6);
   s.velocity = Vector3d(7e3, 100, -3e3);
-  const Trajectory away = integrate(system, system.pack(s), exponential_options(1e-9, 2));
+  const TreeTrajectory away = integrate(system, system.pack(s), exponential_options(1e-9, 2));
   ASSERT_EQ(away.time.size(), here.time.size());
-  const Layout& l = system.layout();
+  const HubLayout& l = system.layout();
   VectorXd size = VectorXd::Zero(l.p + l.u), error = size;
   for (size_t i = 0; i < here.time.size(); ++i) {
     size = size.cwiseMax(here.y[i].head(l.p + l.u).cwiseAbs());
@@ -335,17 +338,17 @@ TEST(Exponential, PlaceDoesNotActBack) {
 
 // Interpolated outputs are as good as steps that end there.
 TEST(Exponential, OutputsBetweenStepsAreOfTheSameQuality) {
-  const System system = sport_boom(2);
+  const Hub system = sport_boom(2);
   const VectorXd y0 = system.pack(system.at_rest({pi / 2 - pi / 60}));
   IntegratorOptions o = exponential_options(1e-8, 0.3);
   o.output_step = 0.0007;
-  const Trajectory fine = integrate(system, y0, o);
+  const TreeTrajectory fine = integrate(system, y0, o);
   VectorXd size = VectorXd::Zero(y0.size());
   for (const VectorXd& y : fine.y) size = size.cwiseMax(y.cwiseAbs());
   for (const size_t i : {100U, 211U, 402U}) {
     IntegratorOptions until = o;
     until.duration = fine.time[i];
-    const Trajectory r = integrate(system, y0, until);
+    const TreeTrajectory r = integrate(system, y0, until);
     EXPECT_LT((r.y.back() - fine.y[i]).cwiseAbs().cwiseQuotient(size).maxCoeff(), 1e-7) << i;
   }
 }

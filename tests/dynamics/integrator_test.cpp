@@ -1,7 +1,7 @@
-#include "dynamics/integrator.hpp"
+#include "dynamics/tree_integrator.hpp"
 
-#include "dynamics_testing.hpp"
 #include "fem/check.hpp"
+#include "hub_testing.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,6 +11,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
+using testing::Hub;
+using testing::HubState;
 
 using std::numbers::pi;
 
@@ -25,7 +27,7 @@ INSTANTIATE_TEST_SUITE_P(Table, EveryMethod, ::testing::ValuesIn(method_names())
                          [](const auto& p) { return p.param; });
 
 /// Boom 2 of SPORT on a hub that does not move: rigid with the inertia of a solid bar, or with eq. 14 modes.
-System boom_2(int modes, double zeta = 0) {
+Hub boom_2(int modes, double zeta = 0) {
   ReducedBody body;
   if (modes == 0) {
     const double m = 0.01645016453235955, J = 0.0004772175595249452;  // boom_properties.json
@@ -36,19 +38,19 @@ System boom_2(int modes, double zeta = 0) {
   }
   Hinge hinge;
   hinge.mechanism = testing::sport_mechanism(0.35);
-  return System(ReducedBody{}, {{body, hinge}}, true);
+  return Hub({}, {{body, hinge}});
 }
 
 /// Every contact and release over 10 s keeps its digits, down to motions of 1e-45 rad.
 TEST_P(EveryMethod, RigidBoomOnAFixedHubFollowsTheExactPiecewiseSolution) {
-  const System system = boom_2(0);
+  const Hub system = boom_2(0);
   for (const int side : {3, -3}) {
     IntegratorOptions o;
     o.method = GetParam();
     o.tolerance = 1e-10;
     o.settle = 0;
     o.rescale_at_events = true;
-    const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + side * pi / 180})), o);
+    const TreeTrajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + side * pi / 180})), o);
     double error = 0;
     for (const auto& row : testing::read_csv("hinge_angle_boom2.csv")) {
       const double exact = std::stod(row[side > 0 ? 1 : 3]);
@@ -72,7 +74,7 @@ TEST_P(EveryMethod, RigidBoomOnAFixedHubFollowsTheExactPiecewiseSolution) {
 
 TEST_P(EveryMethod, FlexibleBoomOnAFixedHubMeetsTheReference) {
   for (const char* zeta : {"0.0", "0.05"}) {
-    const System system = boom_2(1, std::stod(zeta));
+    const Hub system = boom_2(1, std::stod(zeta));
     IntegratorOptions o;
     o.method = GetParam();
     o.tolerance = 1e-10;
@@ -80,7 +82,7 @@ TEST_P(EveryMethod, FlexibleBoomOnAFixedHubMeetsTheReference) {
     o.output_step = 0.005;
     o.settle = 0;
     o.rescale_at_events = true;  // the last contacts are 1e-4 of the first
-    const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + pi / 60})), o);
+    const TreeTrajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + pi / 60})), o);
     double gap_error = 0, q_error = 0, gap_size = 0, q_size = 0;
     for (const auto& row : testing::read_csv("flexible_boom2_fixed_hub.csv")) {
       if (row[0] != "2" || row[1] != "1" || row[2] != zeta) continue;
@@ -111,12 +113,12 @@ TEST_P(EveryMethod, SlowSwingBesideAStop) {
   Appendage a = boom_2(0).appendages()[0];
   const double rate = 2 * pi / 3600, J = a.body.J0(2, 2);
   a.hinge.mechanism = {J * rate * rate, pi / 2 - 0.1, 0, 10.0, pi / 2};
-  const System system(ReducedBody{}, {a}, true);
+  const Hub system({}, {a});
   IntegratorOptions o;
   o.method = GetParam();
   o.duration = 7200;
   o.output_step = 100;
-  const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 - 0.15})), o);
+  const TreeTrajectory r = integrate(system, system.pack(system.at_rest({pi / 2 - 0.15})), o);
   EXPECT_TRUE(r.events.empty());
   EXPECT_LT(r.summary.steps, 3000);
   double error = 0;
@@ -126,18 +128,18 @@ TEST_P(EveryMethod, SlowSwingBesideAStop) {
 }
 
 TEST_P(EveryMethod, ErrorOfAnOscillatorFollowsTheTolerance) {
-  const System damped = boom_2(0);
+  const Hub damped = boom_2(0);
   Appendage a = damped.appendages()[0];
   a.hinge.mechanism.damping = 0;
   a.hinge.mechanism.stop_stiffness = 0;
-  const System system(ReducedBody{}, {a}, true);
+  const Hub system({}, {a});
   const double omega = std::sqrt(a.hinge.mechanism.stiffness / a.body.J0(2, 2));
   for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
     IntegratorOptions o;
     o.method = GetParam();
     o.tolerance = tolerance;
     o.duration = 2;  // 7 periods
-    const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + 0.05})), o);
+    const TreeTrajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + 0.05})), o);
     double error = 0;
     for (size_t i = 0; i < r.time.size(); ++i)
       error = std::max(error, std::abs(r.y[i][0] - 0.05 * std::cos(omega * r.time[i])));
@@ -148,20 +150,20 @@ TEST_P(EveryMethod, ErrorOfAnOscillatorFollowsTheTolerance) {
 
 /// I = (0.134942, 0.10477, 0.05858) tumbling without torque (Jacobi elliptic functions).
 TEST_P(EveryMethod, TorqueFreeTumblingMeetsTheEllipticFunctions) {
-  const System system(rigid_body("hub", 8.5, Vector3d::Zero(), Vector3d(0.134942, 0.10477, 0.05858).asDiagonal()), {});
-  State s = system.at_rest({});
+  const Hub system(rigid_body("hub", 8.5, Vector3d::Zero(), Vector3d(0.134942, 0.10477, 0.05858).asDiagonal()), {});
+  HubState s = system.at_rest({});
   s.omega = Vector3d(0.1, 1, 0.05);
   IntegratorOptions o;
   o.method = GetParam();
   o.tolerance = 1e-10;
   o.duration = 50;
   o.output_step = 1;
-  const Trajectory r = integrate(system, system.pack(s), o);
+  const TreeTrajectory r = integrate(system, system.pack(s), o);
   double rate_error = 0, attitude_error = 0;
   for (const auto& row : testing::read_csv("torque_free_case_b.csv")) {
     const auto i = static_cast<size_t>(std::llround(std::stod(row[1])));
     if (i >= r.time.size()) continue;
-    const State state = system.unpack(r.y[i]);
+    const HubState state = system.unpack(r.y[i]);
     rate_error =
         std::max(rate_error, (state.omega - Vector3d(std::stod(row[2]), std::stod(row[3]), std::stod(row[4]))).norm());
     const Eigen::Vector4d q(std::stod(row[5]), std::stod(row[6]), std::stod(row[7]), std::stod(row[8]));
@@ -175,30 +177,30 @@ TEST_P(EveryMethod, TorqueFreeTumblingMeetsTheEllipticFunctions) {
 }
 
 TEST(Integrator, OutputsStandOnTheGridAndAtTheEnd) {
-  const System system = boom_2(0);
+  const Hub system = boom_2(0);
   IntegratorOptions o;
   o.duration = 0.25;
   o.output_step = 0.1;
-  const Trajectory r = integrate(system, system.pack(system.at_rest({1.5})), o);
+  const TreeTrajectory r = integrate(system, system.pack(system.at_rest({1.5})), o);
   EXPECT_EQ(r.time, (std::vector<double>{0.0, 0.1, 0.2, 0.25}));
 }
 
 TEST(Integrator, StopsWhenAsked) {
-  const System system = boom_2(0);
+  const Hub system = boom_2(0);
   std::atomic<bool> stop{true};
   IntegratorOptions o;
   o.interrupt = &stop;
-  const Trajectory r = integrate(system, system.pack(system.at_rest({1.5})), o);
+  const TreeTrajectory r = integrate(system, system.pack(system.at_rest({1.5})), o);
   EXPECT_TRUE(r.summary.interrupted);
   EXPECT_EQ(r.time, (std::vector<double>{0.0}));
 }
 
 TEST(Integrator, StartsBeyondTheStopAndExactlyOnIt) {
-  const System system = boom_2(0);
+  const Hub system = boom_2(0);
   IntegratorOptions o;
   o.duration = 1;
   EXPECT_FALSE(integrate(system, system.pack(system.at_rest({pi / 2 + 0.1})), o).events.front().contact);
-  State s = system.at_rest({pi / 2});
+  HubState s = system.at_rest({pi / 2});
   EXPECT_TRUE(integrate(system, system.pack(s), o).events.empty());
   s.rate[0] = 1;
   EXPECT_FALSE(integrate(system, system.pack(s), o).events.front().contact);
@@ -213,8 +215,8 @@ TEST(Integrator, StopHoldsABoomThatIsPressedAgainstItFromTheStart) {
   a.hinge.mechanism.rest = 1.8;
   a.hinge.mechanism.damping = 0;
   const HingeMechanism& m = a.hinge.mechanism;
-  const System system(ReducedBody{}, {a}, true);
-  const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2})), {});
+  const Hub system({}, {a});
+  const TreeTrajectory r = integrate(system, system.pack(system.at_rest({pi / 2})), {});
   const double depth = m.stiffness * (m.rest - m.threshold) / (m.stiffness + m.stop_stiffness);
   double deepest = 0;
   for (const VectorXd& y : r.y) deepest = std::max(deepest, y[0]);
@@ -226,28 +228,28 @@ TEST(Integrator, StopHoldsABoomThatIsPressedAgainstItFromTheStart) {
 TEST(Integrator, StopHoldsABoomOnASpinningHub) {
   Appendage a = boom_2(0).appendages()[0];
   a.hinge.mechanism.stop_stiffness = 1000;
-  const System system(rigid_body("hub", 8.5, Vector3d::Zero(), 0.1 * Matrix3d::Identity()), {a});
-  State s = system.at_rest({pi / 2});
+  const Hub system(rigid_body("hub", 8.5, Vector3d::Zero(), 0.1 * Matrix3d::Identity()), {a});
+  HubState s = system.at_rest({pi / 2});
   for (const double spin : {1.0, -1.0}) {
     s.omega = Vector3d(0.3, 0.2, spin);
-    const Trajectory r = integrate(system, system.pack(s), {});
+    const TreeTrajectory r = integrate(system, system.pack(s), {});
     EXPECT_LT(r.summary.energy_balance, 1e-6) << spin;
     for (const VectorXd& y : r.y) EXPECT_LT(y[0], 1e-4) << spin;
   }
 }
 
 TEST(Integrator, SettledHingesAreReportedAndNoLongerLogged) {
-  const System system = boom_2(0);
+  const Hub system = boom_2(0);
   IntegratorOptions o;
   o.tolerance = 1e-6;
-  const Trajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + 0.05})), o);
+  const TreeTrajectory r = integrate(system, system.pack(system.at_rest({pi / 2 + 0.05})), o);
   EXPECT_LT(r.events.size(), 25U);
   EXPECT_GT(r.summary.stops[0].settled, 0);
   EXPECT_LT(std::abs(r.events.back().rate), 1e-6 * 7);  // the tolerance of the largest
 }
 
 TEST(Integrator, NamesTheMethodsThatExist) {
-  const System system = boom_2(0);
+  const Hub system = boom_2(0);
   IntegratorOptions o;
   o.method = "euler";
   try {
@@ -259,7 +261,7 @@ TEST(Integrator, NamesTheMethodsThatExist) {
 }
 
 TEST(Integrator, RefusesBadOptions) {
-  const System system = boom_2(0);
+  const Hub system = boom_2(0);
   const VectorXd y0 = system.pack(system.at_rest({1.5}));
   const auto with = [&](auto change) {
     IntegratorOptions o;

@@ -1,11 +1,10 @@
 #include "dynamics/multipliers.hpp"
 #include "dynamics/formulations.hpp"
-#include "dynamics/integrator.hpp"
 #include "dynamics/rotation.hpp"
 #include "dynamics/tree_integrator.hpp"
 
-#include "dynamics_testing.hpp"
 #include "fem/check.hpp"
+#include "hub_testing.hpp"
 #include "multipliers_testing.hpp"
 #include "sport_testing.hpp"
 
@@ -24,6 +23,8 @@ using Eigen::Vector4d;
 using Eigen::VectorXd;
 using testing::at;
 using testing::at_marker;
+using testing::Hub;
+using testing::HubState;
 using testing::joint;
 
 using std::numbers::pi;
@@ -305,7 +306,7 @@ TEST(Multipliers, EnergiesOfAFastBodyAreThoseOfRelativeCoordinates) {
   const MultibodyTrajectory b = integrate_multipliers(system, body_states(tree, 0, y0), testing::options(1e-9, 2, 0.2));
   ASSERT_EQ(a.time.size(), b.time.size());
   for (size_t i = 0; i < a.time.size(); ++i) {
-    const TreeBalance& e = a.balance[i];
+    const Balance& e = a.balance[i];
     EXPECT_NEAR(b.balance[i].kinetic, e.kinetic, 1e-12 * e.kinetic) << i;
     EXPECT_NEAR(b.states[i].work, e.work, 1e-12 * e.kinetic) << i;
     EXPECT_NEAR(b.balance[i].elastic, e.elastic + e.potential, 1e-12 * e.kinetic) << i;
@@ -317,14 +318,15 @@ TEST(Multipliers, EnergiesOfAFastBodyAreThoseOfRelativeCoordinates) {
 
 void expect_sport(double duration, const char* method, double tolerance, const char* linear_solver) {
   const Sport sport(2);
-  const System system(sport.hub, sport.appendages);
+  const Hub system(sport.hub, sport.appendages);
   IntegratorOptions of_system;
   of_system.method = method;
   of_system.tolerance = 1e-11;
   of_system.duration = duration;
   of_system.settle = 1e-12;
   const double angle = pi / 2 - pi / 60;
-  const Trajectory expected = integrate(system, system.pack(system.at_rest({angle, angle, angle, angle})), of_system);
+  const TreeTrajectory expected =
+      integrate(system, system.pack(system.at_rest({angle, angle, angle, angle})), of_system);
   MultipliersOptions o = testing::options(tolerance, duration, 0.01);
   o.linear_solver = linear_solver;
   o.settle = of_system.settle;
@@ -337,7 +339,7 @@ void expect_sport(double duration, const char* method, double tolerance, const c
     outputs[i].second = std::max(outputs[i].second, size);
   };
   for (size_t i = 0; i < r.states.size(); ++i) {
-    const State s = system.unpack(expected.y[i]);
+    const HubState s = system.unpack(expected.y[i]);
     const BodyState& hub = r.states[i].bodies[0];
     Vector4d back = s.attitude;
     back.tail<3>() *= -1;

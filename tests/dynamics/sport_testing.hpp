@@ -1,5 +1,6 @@
 #pragma once
 
+#include "dynamics/hub_with_booms.hpp"
 #include "dynamics_testing.hpp"
 
 #include <vector>

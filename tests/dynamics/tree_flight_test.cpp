@@ -79,7 +79,7 @@ TEST(TreeFlight, TheMethodSuitsTheScene) {
   const Tree body(free_bodies({{0.134942, 0.10477, 0.05858}}));
   TreeState tumbling = body.at_rest();
   tumbling.joints[0].omega = Vector3d(0.1, 1, 0.05);
-  const TreeTrajectory slow = integrate(body, body.pack(tumbling), tree_options("auto", 1e-6, 5, 0.1));
+  const TreeTrajectory slow = integrate(body, body.pack(tumbling), tree_options("auto", 1e-6, 50, 0.1));
   EXPECT_EQ(slow.summary.method, "erk");
   EXPECT_NE(slow.summary.why_method.find("nonlinear"), std::string::npos) << slow.summary.why_method;
 }
@@ -152,7 +152,7 @@ TEST(TreeFlight, FreeChainKeepsItsMomenta) {
   for (auto& q : s.q_dot) q *= 0.1;
   const TreeTrajectory flight = integrate(tree, tree.pack(s), tree_options("bdf", 1e-9, 2, 0.05));
   EXPECT_LT(flight.summary.energy_balance, 1e-8);
-  EXPECT_LT(flight.summary.momentum_drift, 1e-9);
+  EXPECT_LT(flight.summary.momentum_drift, 2e-9);  // relative to what turns, without what moves along
   EXPECT_GT(flight.balance.back().dissipated_by_joint[0], 1e-3);
 }
 

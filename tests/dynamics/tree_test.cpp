@@ -1,6 +1,5 @@
 #include "dynamics/tree.hpp"
 
-#include "dynamics/multibody_of.hpp"
 #include "dynamics/rotation.hpp"
 #include "fem/check.hpp"
 #include "tree_oracle.hpp"
@@ -42,52 +41,6 @@ PointBody body_with_markers(std::mt19937& random, int n, const std::string& name
     p.body.markers.push_back(m);
   }
   return p;
-}
-
-// ---- against System ----
-
-TEST(Tree, OfAHubWithHingedBoomsIsTheSystem) {
-  for (const bool fixed_hub : {false, true}) {
-    std::mt19937 random(42);
-    std::vector<Appendage> booms;
-    for (int i = 0; i < 3; ++i) {
-      Hinge hinge;
-      hinge.name = fmt::format("hinge {}", i);
-      hinge.point = Vector3d(0.1, -0.2 * i, 0.3);
-      hinge.stowed = Vector3d(0, 0.6, 0.8);
-      hinge.outward = i == 0 ? Vector3d(1, 0, 0) : Vector3d(0, -0.8, 0.6);
-      hinge.mechanism = {0.3, 1.2, 0.02, 9.0, 1.4};
-      const std::string name = fmt::format("body {}", i);
-      booms.push_back({i < 2 ? testing::random_point_body(random, 7, 3 - i, name).body
-                             : eq14::reduced_body(testing::round_boom(0.3, 0.01), 4, eq14::Planes::xy, name),
-                       hinge});
-    }
-    const ReducedBody hub = rigid_body("hub", 8.5, Vector3d(0.01, 0, 0.02), Vector3d(0.2, 0.3, 0.4).asDiagonal());
-    const System system(hub, booms, fixed_hub);
-    const Tree tree(multibody_of(system));
-    std::uniform_real_distribution<double> uniform(-1, 1);
-    const auto noise = [&] { return uniform(random); };
-    const Layout& l = system.layout();
-    VectorXd y = VectorXd::NullaryExpr(l.size, noise), y_dot(l.size);
-    if (!fixed_hub) y.segment<4>(l.attitude()).normalize();
-    const std::vector<char> contact = {1, 0, 1};
-    std::vector<char> contact_of_tree = contact;
-    if (!fixed_hub) contact_of_tree.insert(contact_of_tree.begin(), 0);
-    system.derivative(y.data(), contact, *system.workspace(), y_dot.data());
-    VectorXd of_tree = VectorXd::Zero(tree.layout().size);
-    const int motion = l.dissipated();
-    of_tree.head(motion) = y.head(motion);
-    const VectorXd found = derivative(tree, 0, of_tree, contact_of_tree).head(motion);
-    // Round-off of two orders of summation with a condition number near 1e3.
-    EXPECT_LT((found - y_dot.head(motion)).norm(), 1e-12 * y_dot.norm()) << fixed_hub;
-    const Balance expected = system.balance(y, *system.workspace());
-    const TreeBalance balance = tree.balance(0, of_tree);
-    EXPECT_NEAR(balance.kinetic / expected.kinetic, 1, 1e-13);
-    EXPECT_NEAR(balance.elastic / expected.elastic, 1, 1e-13);
-    if (fixed_hub) continue;
-    EXPECT_LT((balance.momentum - expected.momentum).norm(), 1e-13 * expected.momentum_scale);
-    EXPECT_LT((balance.angular_momentum - expected.angular_momentum).norm(), 1e-13 * expected.angular_momentum_scale);
-  }
 }
 
 // ---- against virtual power over point masses ----

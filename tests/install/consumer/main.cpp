@@ -1,6 +1,7 @@
 // Walks through every installed library once: a boom as beams, its modes, its reduced body, and a short flight on a
 // hub.
-#include <dynamics/integrator.hpp>
+#include <dynamics/hub_with_booms.hpp>
+#include <dynamics/tree_integrator.hpp>
 #include <fem/boom.hpp>
 #include <reduction/eq14.hpp>
 #include <reduction/inertia_invariants.hpp>
@@ -37,10 +38,12 @@ int main() {
   Hinge hinge;
   hinge.mechanism.stiffness = 0.2;
   hinge.mechanism.damping = 0.01;
-  const System system(hub, {Appendage{boom, hinge}});
+  const Tree satellite(hub_with_booms(hub, {{boom, hinge}}));
+  TreeState start = satellite.at_rest();
+  start.joints[1].coordinate = {std::numbers::pi / 2 - 0.05};
   IntegratorOptions options;
   options.duration = 0.1;
-  const Trajectory motion = integrate(system, system.pack(system.at_rest({std::numbers::pi / 2 - 0.05})), options);
+  const TreeTrajectory motion = integrate(satellite, satellite.pack(start), options);
   std::cout << "flight of " << motion.time.back() << " s: energy balance " << motion.summary.energy_balance << '\n';
 
   const bool passed =
