@@ -25,7 +25,7 @@ using namespace flexboom;
 
 /// The command line of the whole program. `action` is set by the sub-command that was given.
 struct CommandLine {
-  CLI::App app{"flexboom turns the geometry of a boom into a reduced flexible body, and flies that body."};
+  CLI::App app{"flexboom makes reduced flexible bodies from the geometry of booms, and simulates them."};
   CommonOptions common;
   RunArguments run;
   ModesArguments modes;

@@ -174,13 +174,13 @@ void check_scene(const Scene& scene, Faults& faults) {
   if (!scene.is_tree) check_hub(faults, scene);
   const bool in_field = scene.orbit && scene.orbit->gravity != "none";
   if (in_field && scene.hub.fixed)
-    faults.add("orbit.gravity", "acts on bodies that fly, but hub.fixed is true; drop one of them");
+    faults.add("orbit.gravity", "acts on bodies in orbit, but hub.fixed is true; drop one of them");
   if (in_field && !scene.gravity.isZero(0))
     faults.add("gravity", "is uniform, and orbit.gravity is that of the Earth; drop one of them");
   for (const JointScene& j : scene.joints)
     if (in_field && j.a.body.empty() && j.kind != JointKind::free)
       faults.add("orbit.gravity",
-                 fmt::format("acts on bodies that fly, but joint {} holds one in the frame of the orbit", j.name));
+                 fmt::format("acts on bodies in orbit, but joint {} holds one in the frame of the orbit", j.name));
   for (size_t i = 0; i < scene.bodies.size(); ++i) check_body(scene.bodies[i], fmt::format("bodies[{}]", i), faults);
   for (size_t i = 0; i < scene.hinges.size(); ++i) check_hinge(faults, fmt::format("hinges[{}]", i), scene.hinges[i]);
   check_body_names(faults, scene);

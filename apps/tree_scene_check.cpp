@@ -248,9 +248,9 @@ class TreeCheck {
     for (size_t i = 0; i < scene_.bodies.size(); ++i) {
       const std::string& name = scene_.bodies[i].name;
       if (!carrier.contains(name)) {
-        faults_.add(
-            fmt::format("bodies[{}]", i),
-            fmt::format("{} hangs on no joint; if it flies, give it one of kind \"free\"", toml_reader::quoted(name)));
+        faults_.add(fmt::format("bodies[{}]", i),
+                    fmt::format("{} hangs on no joint; if it is free, give it one of kind \"free\"",
+                                toml_reader::quoted(name)));
       } else if (!leads_home(name, carrier)) {
         faults_.add(fmt::format("joints[{}].a", carrier[name]),
                     fmt::format("body {} hangs on itself in a circle of joints; one of them must start from the "
