@@ -16,7 +16,7 @@ asan build-asan fuzz: packages += clang libclang-rt-14-dev
 sources = $(wildcard $(foreach folder,fem reduction dynamics apps tests tests/* tests/install/*,$(folder)/*.hpp $(folder)/*.cpp))
 
 help:
-	@echo "make run           build, fly the scene sport, write results/sport and its report"
+	@echo "make run           build, simulate the scene sport, write results/sport and its report"
 	@echo "make test          build and run the tests; asan: the same with sanitizers; slow: the long ones"
 	@echo "make fuzz          random bytes into the mesh readers, FUZZ_SECONDS (600) for each, with sanitizers"
 	@echo "make bench         speed, measured"

@@ -104,6 +104,7 @@ struct CompareArguments {
 // One function per command; each returns its exit code and throws InputError or NumericalError.
 int run_command(const RunArguments&, const CommonOptions&);
 int check_command(const std::string& scene, const CommonOptions&);
+int keys_command(const std::string& table, const CommonOptions&);
 int modes_command(const ModesArguments&, const CommonOptions&);
 int mesh_command(const MeshArguments&, const CommonOptions&);
 int reduce_command(const ReduceArguments&, const CommonOptions&);

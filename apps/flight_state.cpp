@@ -118,7 +118,7 @@ std::string to_toml(const FlightState& state, const std::string& scene) {
   out.table("[modes]");
   for (const auto& [body, n] : state.modes) out.key(toml(body), n);
   out.table("[largest]");
-  out.key("energy", state.largest.energy, "[J], of the whole flight: what its balances are relative to");
+  out.key("energy", state.largest.energy, "[J], of the whole run: what its balances are relative to");
   out.key("momentum", state.largest.momentum, "[N s]");
   out.key("angular_momentum", state.largest.angular_momentum, "[N m s]");
   out.table("[state]");

@@ -1,11 +1,12 @@
-// The archives: read, check, write, document.
+// The archives that read, check and write.
 
 #include "apps/keys.hpp"
 
 #include "apps/scene_checks.hpp"
-#include "apps/scene_keys.hpp"
+#include "apps/toml_writer.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 
@@ -15,75 +16,100 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
+using scene_checks::join;
 using toml_reader::TableReader;
 using toml_writer::toml;
 
 constexpr double repairable_skew = 0.02;  // of the largest entry of an inertia; misprints, not other matrices
 
-void read(TableReader& t, const Key& k, double& v) {
-  v = t.number(k.name, k.required ? std::nullopt : std::optional(v));
+// --- reading ---
+
+template <class T>
+std::optional<T> otherwise(const Key& k, const T& v) {
+  return k.required ? std::nullopt : std::optional(v);
 }
-void read(TableReader& t, const Key& k, int& v) { v = t.integer(k.name, k.required ? std::nullopt : std::optional(v)); }
-void read(TableReader& t, const Key& k, bool& v) { v = t.boolean(k.name, v); }
-void read(TableReader& t, const Key& k, std::string& v) {
-  v = t.text(k.name, k.required ? std::nullopt : std::optional(v));
+
+void read(KeyReader& r, const Key& k, double& v) { v = r.table().number(k.name, otherwise(k, v)); }
+void read(KeyReader& r, const Key& k, int& v) { v = r.table().integer(k.name, otherwise(k, v)); }
+void read(KeyReader& r, const Key& k, bool& v) { v = r.table().boolean(k.name, v); }
+void read(KeyReader& r, const Key& k, std::string& v) { v = r.table().text(k.name, otherwise(k, v)); }
+void read(KeyReader& r, const Key& k, Vector3d& v) { v = r.table().vector(k.name, otherwise(k, v)); }
+void read(KeyReader& r, const Key& k, std::vector<std::string>& v) { v = r.table().texts(k.name, v); }
+
+void read(KeyReader& r, const Key& k, Choice& v) {
+  if (k.required && !r.has(k.name))
+    r.table().fault(k.name, fmt::format("is missing; it must be one of \"{}\"", fmt::join(k.words, "\", \"")));
+  v.index = r.table().choice(k.name, k.words, v.index);
 }
-void read(TableReader& t, const Key& k, Vector3d& v) {
-  v = t.vector(k.name, k.required ? std::nullopt : std::optional(v));
-}
-void read(TableReader& t, const Key& k, Vector4d& v) {
-  const std::vector<double> four = t.numbers(k.name);
-  if (four.size() == 4) {
-    v = Eigen::Map<const Vector4d>(four.data());
-  } else if (t.has(k.name)) {
-    t.fault(k.name, "must be a unit quaternion [w, x, y, z], from the axes of b to those of a");
+
+void read(KeyReader& r, const Key& k, NumberOrWord& v) {
+  if (!r.has(k.name) && !k.required) return;
+  v.word.clear();
+  if (r.table().is_text(k.name)) {
+    v.word = r.table().text(k.name);
+    if (std::ranges::find(k.words, v.word) == k.words.end())
+      r.table().fault(k.name,
+                      toml_reader::not_among(v.word, k.words) + (v.whole ? ", or a whole number" : ", or a number"));
+  } else {
+    v.number = v.whole ? r.table().integer(k.name) : r.table().number(k.name);
   }
 }
-void read(TableReader& t, const Key& k, Matrix3d& v) {
-  v = t.matrix(k.name, k.required ? std::nullopt : std::optional(v));
+
+void read(KeyReader& r, const Key& k, Vector4d& v) {
+  const std::vector<double> four = r.table().numbers(k.name);
+  if (four.size() == 4) {
+    v = Eigen::Map<const Vector4d>(four.data());
+  } else if (r.has(k.name)) {
+    r.table().fault(k.name, "must be a unit quaternion [w, x, y, z], from the axes of b to those of a");
+  }
 }
-void read(TableReader& t, const Key& k, std::vector<std::string>& v) { v = t.texts(k.name, v); }
-void read(TableReader& t, const Key& k, std::vector<double>& v) {
-  if (t.has(k.name)) v = t.numbers(k.name);
-}
-void read(TableReader& t, const Key& k, PlaceScene& v) {
-  if (k.required || t.has(k.name)) v = read_place(t, k.name);
-}
-void read(TableReader& t, const Key& k, CourseScene& v) { v = read_course(t, k.name); }
-void read(TableReader& t, const Key& k, std::vector<CourseScene>& v) { v = read_courses(t, k.name); }
-void read(TableReader& t, const Key& k, std::array<CourseScene, 3>& v) { v = read_three_courses(t, k.name); }
 
 // An inertia is symmetric; a matrix is nothing else here.
-void repair(TableReader& table, const Key& key, Matrix3d& inertia, std::vector<std::string>& warnings) {
-  const double scale = inertia.cwiseAbs().maxCoeff();
-  const double skew = (inertia - inertia.transpose()).cwiseAbs().maxCoeff();
-  if (!(skew > 0 && skew <= repairable_skew * scale)) return;
-  warnings.push_back(
+void read(KeyReader& r, const Key& k, Matrix3d& v) {
+  v = r.table().matrix(k.name, otherwise(k, v));
+  const double skew = (v - v.transpose()).cwiseAbs().maxCoeff();
+  if (!(skew > 0 && skew <= repairable_skew * v.cwiseAbs().maxCoeff())) return;
+  r.reading().warnings.push_back(
       fmt::format("{}: not symmetric (entries across the diagonal differ by up to {:g} kg m^2); "
                   "(I + I^T)/2 is used",
-                  table.path(key.name), skew));
-  inertia = (0.5 * (inertia + inertia.transpose())).eval();
+                  r.table().path(k.name), skew));
+  v = (0.5 * (v + v.transpose())).eval();
 }
 
-std::string brief(const Vector3d& v) {
-  return v.isZero(0) ? "zero" : fmt::format("[{:g}, {:g}, {:g}]", v.x(), v.y(), v.z());
+void read(KeyReader& r, const Key& k, std::vector<double>& v) {
+  if (r.has(k.name)) v = r.table().numbers(k.name);
+  if (k.required && v.empty() && !r.has(k.name)) r.table().fault(k.name, "is missing; give an array of numbers");
 }
-std::string brief(const Vector4d& v) { return fmt::format("[{:g}, {:g}, {:g}, {:g}]", v[0], v[1], v[2], v[3]); }
-std::string brief(const Matrix3d&) { return "zero"; }
-std::string brief(double v) { return fmt::format("{:g}", v); }
-std::string brief(int v) { return fmt::format("{}", v); }
-std::string brief(bool v) { return v ? "true" : "false"; }
-std::string brief(const std::string& v) { return v.empty() ? "none" : '`' + toml(v) + '`'; }
+void read(KeyReader& r, const Key& k, std::optional<double>& v) {
+  if (r.has(k.name)) v = r.table().number(k.name);
+}
+template <class Courses>
+void read(KeyReader& r, const Key& k, Courses& v) {
+  read_course(r, k.name, v);
+}
+
+// --- writing ---
+
+std::string value_text(const Key& k, const Choice& v) { return toml(k.words[v.index]); }
+std::string value_text(const Key&, const NumberOrWord& v) {
+  return !v.word.empty() ? toml(v.word) : v.whole ? fmt::format("{}", v.number) : toml(v.number);
+}
+std::string value_text(const Key&, const std::optional<double>& v) { return toml(*v); }
+std::string value_text(const Key&, const CourseScene& v) { return toml(v); }
+std::string value_text(const Key&, const std::vector<CourseScene>& v) {
+  return v.size() == 1 ? toml(v[0]) : fmt::format("[{}, {}]", toml(v.at(0)), toml(v.at(1)));
+}
+std::string value_text(const Key&, const std::array<CourseScene, 3>& v) {
+  return fmt::format("[{}, {}, {}]", toml(v[0]), toml(v[1]), toml(v[2]));
+}
 template <class T>
-std::string brief(const std::vector<T>& v) {
-  return v.empty() ? "none" : "";
+std::string value_text(const Key&, const T& v) {
+  return toml(v);
 }
-std::string brief(const PlaceScene&) { return "none"; }
-std::string brief(const CourseScene&) { return "none"; }
-std::string brief(const std::array<CourseScene, 3>&) { return "zero"; }
 
 bool is_given(const CourseScene& c) { return c.given(); }
 bool is_given(const std::vector<CourseScene>& c) { return !c.empty(); }
+bool is_given(const std::optional<double>& v) { return v.has_value(); }
 template <class T>
 bool is_given(const T&) {
   return true;
@@ -92,38 +118,73 @@ bool is_given(const T&) {
 }  // namespace
 
 void KeyReader::item(const Key& key, const AnyKeyValue& any) {
+  std::visit([&](const auto& item) { read(*this, key, *item.value); }, any);
+}
+
+void KeyReader::below(const Key& key, const Tables& tables) {
+  const auto take = [&](TableReader& table, size_t i) {
+    KeyReader reader(table, reading_);
+    tables.keys(reader, i);
+    reader.finish();
+  };
+  if (tables.many) {
+    std::vector<TableReader> found = table_.tables(key.name);
+    tables.make(found.size());
+    for (size_t i = 0; i < found.size(); ++i) take(found[i], i);
+  } else if (auto found = table_.table(key.name, key.required)) {
+    tables.make(1);
+    take(*found, 0);
+  }
+}
+
+void KeyReader::finish() {
+  if (!takes_any_key_) table_.reject_unknown(hint_);
+}
+
+void KeyChecker::item(const Key& key, const AnyKeyValue& any) {
+  const std::string unit = key.unit.empty() ? "" : ' ' + std::string(key.unit), path = join(path_, key.name);
+  if (const auto* word = std::get_if<KeyValue<std::string>>(&any); word && !key.words.empty())
+    scene_checks::check_name_among(faults_, path, *word->value, key.words);
   std::visit(
       [&](const auto& item) {
-        read(table_, key, *item.value);
-        if constexpr (std::is_same_v<decltype(item.value), Matrix3d*>)
-          if (warnings_) repair(table_, key, *item.value, *warnings_);
+        if (item.check) item.check(faults_, path, *item.value, unit);
       },
       any);
 }
 
-void KeyChecker::item(const Key& key, const AnyKeyValue& any) {
-  const std::string unit = key.unit.empty() ? "" : ' ' + std::string(key.unit);
-  std::visit(
-      [&](const auto& item) {
-        if (item.check) item.check(faults_, scene_checks::join(path_, key.name), *item.value, unit);
-      },
-      any);
+void KeyChecker::below(const Key& key, const Tables& tables) {
+  for (size_t i = 0; i < tables.count; ++i) {
+    const std::string path = join(path_, key.name);
+    KeyChecker checker(faults_, tables.many ? fmt::format("{}[{}]", path, i) : path);
+    tables.keys(checker, i);
+  }
+}
+
+void KeyWriter::add(std::string_view key, const std::string& value, std::string_view comment) {
+  if (in_one_line_)
+    keys_ += fmt::format("{}{} = {}", keys_.empty() ? "" : ", ", key, value);
+  else
+    keys_ += fmt::format("{} = {}{}{}\n", key, value, comment.empty() ? "" : "  # ", comment);
 }
 
 void KeyWriter::item(const Key& key, const AnyKeyValue& any) {
   std::visit(
       [&](const auto& item) {
-        if (is_given(*item.value)) out_.raw(key.name, toml(*item.value), key.unit);
+        if (is_given(*item.value)) add(key.name, value_text(key, *item.value), key.unit);
       },
       any);
 }
 
-void KeyTable::item(const Key& key, const AnyKeyValue& any) {
-  const std::string otherwise = key.required ? ""
-                                : !key.otherwise.empty()
-                                    ? std::string(key.otherwise)
-                                    : std::visit([](const auto& i) { return brief(*i.value); }, any);
-  text_ += fmt::format("| `{}` | {} | {} | {} |\n", key.name, key.unit, key.what, otherwise);
+void KeyWriter::below(const Key& key, const Tables& tables) {
+  const std::string path = join(path_, key.name);
+  for (size_t i = 0; i < tables.count; ++i) {
+    KeyWriter writer(path, !tables.name.empty());
+    tables.keys(writer, i);
+    if (!tables.name.empty())
+      add(key.name, "{ " + std::move(writer).text() + " }", "");
+    else
+      tables_ += fmt::format(fmt::runtime(tables.many ? "\n[[{}]]\n{}" : "\n[{}]\n{}"), path, std::move(writer).text());
+  }
 }
 
 }  // namespace flexboom

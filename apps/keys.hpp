@@ -2,31 +2,41 @@
 
 #include "apps/scene.hpp"
 #include "apps/toml_reader.hpp"
-#include "apps/toml_writer.hpp"
 
 #include <Eigen/Core>
 
+#include <functional>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <variant>
 #include <vector>
 
-/// One description per key of a scene: `keys(Archive&, Struct&)` says the keys of a struct once, archives read, check,
-/// write and document them. A default is what the struct has by itself. Internal to `apps`.
+/// One description per key of scenes and bodies: `keys(Archive&, Struct&)` says the keys of a struct once, archives
+/// read, check, write and document them. A default is what the struct has by itself. Internal to `apps`.
 namespace flexboom {
-
-std::string toml(const PlaceScene&);
-std::string toml(const CourseScene&);
-std::string toml(const std::vector<CourseScene>&);
-std::string toml(const std::array<CourseScene, 3>&);
 
 struct Key {
   std::string_view name;
   std::string_view unit;  // empty: none
   std::string_view what;  // for the tables of meshes/README.md
   bool required = false;
-  std::string_view otherwise = "";  // the default in words, where it is not that of the struct
+  std::string_view otherwise = "";               // the default in words, where it is not that of the struct
+  std::span<const std::string_view> words = {};  // that a text may be; empty: any
+};
+
+/// Which of the words of its key.
+struct Choice {
+  size_t index = 0;
+};
+
+/// One of the words of its key, or a number where there is no word.
+struct NumberOrWord {
+  double number = 0;
+  std::string word;
+  bool whole = false;
 };
 
 /// Adds a fault at the path of a value that is out of its range. `unit` has a space in front.
@@ -39,95 +49,175 @@ struct KeyValue {
   Check<T> check;  // nullptr: every value is right
 };
 
-/// The kinds of values that a scene may have.
+/// The kinds of values that a key may have.
 using AnyKeyValue =
-    std::variant<KeyValue<double>, KeyValue<int>, KeyValue<bool>, KeyValue<std::string>, KeyValue<Eigen::Vector3d>,
-                 KeyValue<Eigen::Vector4d>, KeyValue<Eigen::Matrix3d>, KeyValue<std::vector<std::string>>,
-                 KeyValue<std::vector<double>>, KeyValue<PlaceScene>, KeyValue<CourseScene>,
-                 KeyValue<std::vector<CourseScene>>, KeyValue<std::array<CourseScene, 3>>>;
+    std::variant<KeyValue<double>, KeyValue<int>, KeyValue<bool>, KeyValue<std::string>, KeyValue<Choice>,
+                 KeyValue<NumberOrWord>, KeyValue<Eigen::Vector3d>, KeyValue<Eigen::Vector4d>,
+                 KeyValue<Eigen::Matrix3d>, KeyValue<std::vector<std::string>>, KeyValue<std::vector<double>>,
+                 KeyValue<std::optional<double>>, KeyValue<CourseScene>, KeyValue<std::vector<CourseScene>>,
+                 KeyValue<std::array<CourseScene, 3>>>;
+
+class Archive;
+class KeyReader;
+
+/// Tables below a key.
+struct Tables {
+  bool many = false;                           // an array of tables
+  std::string_view name;                       // of a table that is written in one line and documented under this name
+  size_t count = 0;                            // that there are
+  std::function<void(size_t)> make;            // so many of them
+  std::function<void(Archive&, size_t)> keys;  // of one of them; beyond the last: of one with all its defaults
+};
 
 class Archive {
  public:
+  enum class Use { read, check, write, document };
+
   virtual ~Archive() = default;
+  virtual Use use() const = 0;
+  virtual KeyReader* reader() { return nullptr; }
 
   template <class T>
   void key(const Key& key, T& value, std::type_identity_t<Check<T>> check = nullptr) {
     item(key, KeyValue<T>{&value, check});
   }
 
-  /// Are values taken from a file? Defaults that follow from other keys are set then.
-  virtual bool reads() const { return false; }
+  /// A text that is one of these words, or an enumeration whose values have these names in their order.
+  template <class T>
+  void choice(Key key, std::span<const std::string_view> words, T& value) {
+    key.words = words;
+    if constexpr (std::is_same_v<T, std::string>) {
+      item(key, KeyValue<T>{&value, nullptr});
+    } else {
+      Choice choice{static_cast<size_t>(value)};
+      item(key, KeyValue<Choice>{&choice, nullptr});
+      value = static_cast<T>(choice.index);
+    }
+  }
+
+  /// A number, or one of these words.
+  void choice_or_number(Key key, std::span<const std::string_view> words, NumberOrWord& value,
+                        Check<NumberOrWord> check = nullptr) {
+    key.words = words;
+    item(key, KeyValue<NumberOrWord>{&value, check});
+  }
+
+  /// A table. With a name it is written in one line.
+  template <class T, class F>
+  void table(const Key& key, T& value, F keys, std::string_view name = "", bool there = true) {
+    const auto one = [&](Archive& a, size_t) { keys(a, value); };
+    below(key, {.many = false, .name = name, .count = there ? 1u : 0u, .make = [](size_t) {}, .keys = one});
+  }
+  template <class T, class F>
+  void table(const Key& key, std::optional<T>& value, F keys, std::string_view name = "") {
+    const auto one = [&](Archive& a, size_t) {
+      T blank{};
+      keys(a, value ? *value : blank);
+    };
+    below(
+        key,
+        {.many = false, .name = name, .count = value ? 1u : 0u, .make = [&](size_t) { value.emplace(); }, .keys = one});
+  }
+  template <class T, class F>
+  void tables(const Key& key, std::vector<T>& values, F keys) {
+    const auto one = [&](Archive& a, size_t i) {
+      T blank{};
+      keys(a, i < values.size() ? values[i] : blank);
+    };
+    below(key,
+          {.many = true, .name = "", .count = values.size(), .make = [&](size_t n) { values.resize(n); }, .keys = one});
+  }
+
+  /// Keys of the same table that are documented under a name of their own.
+  virtual void part(std::string_view /*name*/, const std::function<void(Archive&)>& keys) { keys(*this); }
 
  protected:
   virtual void item(const Key&, const AnyKeyValue&) = 0;
+  virtual void below(const Key&, const Tables&) = 0;
 };
 
 // apps/scene_language.cpp
-void settings_keys(Archive&, Scene&);  // of the top level
-void accuracy_keys(Archive&, Scene&);
-void integrator_keys(Archive&, Scene&);
-void initial_keys(Archive&, Scene&);
-void orbit_keys(Archive&, OrbitScene&);
-void hub_keys(Archive&, HubScene&);
-void hinge_keys(Archive&, HingeScene&);
+void scene_keys_of_file(Archive&, Scene&);
+void shorthand_keys(Archive&, Scene&);  // [hub], [initial], [[hinges]]
 void rigid_keys(Archive&, RigidScene&);
-void damping_keys(Archive&, DampingRule&);
-void solid_keys(Archive&, SolidOptions&);
-void grading_keys(Archive&, SolidGrading&);
-void joint_keys(Archive&, JointScene&);
-void spring_keys(Archive&, SpringScene&);
-void load_keys(Archive&, LoadScene&);
-void wheel_keys(Archive&, WheelScene&);
-void turn_keys(Archive&, TurnScene&);
+void place_keys(Archive&, PlaceScene&);
+void turn_from_rest_keys(Archive&, Manoeuvre&);
+void timed_turn_keys(Archive&, Manoeuvre&);
+void time_table_keys(Archive&, TimeTable&);
 
-/// Reads what a table has. Every key of `value` that the table lacks stays as it is.
+// apps/body_language.cpp
+void body_keys(Archive&, BodyScene&);  // of a [[bodies]] entry
+void boom_keys(Archive&, BodyScene&);  // of a body file
+
+/// What reading fills besides the values.
+struct Reading {
+  toml_reader::Faults faults;
+  std::vector<std::string> warnings;
+  std::filesystem::path folder;  // that `file` of a body is relative to
+};
+
+/// Reads what a table has. Every key that the table lacks leaves its value as it is.
 class KeyReader : public Archive {
  public:
-  KeyReader(toml_reader::TableReader& table, std::vector<std::string>* warnings) : table_(table), warnings_(warnings) {}
-  bool reads() const override { return true; }
+  KeyReader(toml_reader::TableReader table, Reading& reading) : table_(std::move(table)), reading_(reading) {}
+  Use use() const override { return Use::read; }
+  KeyReader* reader() override { return this; }
+
+  toml_reader::TableReader& table() { return table_; }
+  Reading& reading() { return reading_; }
+  bool has(std::string_view key) { return table_.has(key); }
+
+  /// Put behind the message of an unknown key.
+  void hint(std::string text) { hint_ = std::move(text); }
+  /// It is not known which other keys belong here.
+  void take_any_key() { takes_any_key_ = true; }
+  /// Every key that was not asked for is a fault.
+  void finish();
 
  protected:
   void item(const Key&, const AnyKeyValue&) override;
+  void below(const Key&, const Tables&) override;
 
  private:
-  toml_reader::TableReader& table_;
-  std::vector<std::string>* warnings_;  // nullptr: an inertia is not repaired
+  toml_reader::TableReader table_;
+  Reading& reading_;
+  std::string hint_;
+  bool takes_any_key_ = false;
 };
 
 class KeyChecker : public Archive {
  public:
   KeyChecker(toml_reader::Faults& faults, std::string path) : faults_(faults), path_(std::move(path)) {}
+  Use use() const override { return Use::check; }
 
  protected:
   void item(const Key&, const AnyKeyValue&) override;
+  void below(const Key&, const Tables&) override;
 
  private:
   toml_reader::Faults& faults_;
   std::string path_;
 };
 
-/// Writes every key; functions of time only where they are given.
+/// TOML that reads back bit for bit: every key; functions of time only where they are given.
 class KeyWriter : public Archive {
  public:
-  explicit KeyWriter(toml_writer::Writer& out) : out_(out) {}
+  /// `path`: of the tables below; in one line: "a = 1, b = 2".
+  explicit KeyWriter(std::string path = "", bool in_one_line = false)
+      : path_(std::move(path)), in_one_line_(in_one_line) {}
+  Use use() const override { return Use::write; }
+  std::string text() && { return keys_ + tables_; }
 
  protected:
   void item(const Key&, const AnyKeyValue&) override;
+  void below(const Key&, const Tables&) override;
 
  private:
-  toml_writer::Writer& out_;
-};
+  void add(std::string_view key, const std::string& value, std::string_view comment);
 
-/// Rows of a Markdown table.
-class KeyTable : public Archive {
- public:
-  std::string text() && { return std::move(text_); }
-
- protected:
-  void item(const Key&, const AnyKeyValue&) override;
-
- private:
-  std::string text_ = "| key | unit | meaning | default |\n|---|---|---|---|\n";
+  std::string path_;
+  bool in_one_line_;
+  std::string keys_, tables_;  // a table's own keys stand before the tables below
 };
 
 template <class T>
@@ -142,22 +232,24 @@ void check_keys(toml_reader::Faults& faults, const std::string& path, const T& v
 }
 
 template <class T>
-void write_keys(toml_writer::Writer& out, const char* header, const T& value, std::type_identity_t<Keys<T>> keys) {
-  if (*header) out.table(header);
-  KeyWriter writer(out);
+std::string in_one_line(const T& value, std::type_identity_t<Keys<T>> keys) {
+  KeyWriter writer("", true);
   keys(writer, const_cast<T&>(value));
+  return "{ " + std::move(writer).text() + " }";
 }
 
 /// Reads a whole table, whose other keys are faults.
 template <class T>
-void read_keys(toml_reader::TableReader& table, T& value, std::type_identity_t<Keys<T>> keys,
-               std::vector<std::string>* warnings = nullptr) {
-  KeyReader reader(table, warnings);
+void read_keys(toml_reader::TableReader table, Reading& reading, T& value, std::type_identity_t<Keys<T>> keys) {
+  KeyReader reader(std::move(table), reading);
   keys(reader, value);
-  table.reject_unknown();
+  reader.finish();
 }
 
-/// The tables of meshes/README.md.
-std::string key_tables();
+/// Functions of time (apps/time_course_keys.cpp).
+void read_course(KeyReader&, std::string_view key, CourseScene&);
+void read_course(KeyReader&, std::string_view key, std::vector<CourseScene>&);
+void read_course(KeyReader&, std::string_view key, std::array<CourseScene, 3>&);
+std::string toml(const CourseScene&);
 
 }  // namespace flexboom

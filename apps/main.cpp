@@ -25,7 +25,7 @@ using namespace flexboom;
 
 /// The command line of the whole program. `action` is set by the sub-command that was given.
 struct CommandLine {
-  CLI::App app{"flexboom turns the geometry of a boom into a reduced flexible body, and flies that body."};
+  CLI::App app{"flexboom makes reduced flexible bodies from the geometry of booms, and simulates them."};
   CommonOptions common;
   RunArguments run;
   ModesArguments modes;
@@ -36,6 +36,7 @@ struct CommandLine {
   BenchArguments bench;
   CompareArguments compare;
   std::string checked;
+  std::string keys_of;
   std::filesystem::path reported;
   std::function<int()> action;
 
@@ -43,6 +44,7 @@ struct CommandLine {
     app.set_version_flag("--version", version_text());
     add_run();
     add_check();
+    add_keys();
     add_modes();
     add_mesh();
     add_reduce();
@@ -88,6 +90,12 @@ struct CommandLine {
     CLI::App* c = command("check", "Reads and checks everything, computes nothing, lists all faults");
     c->add_option("SCENE", checked, "Scene or body file, or the name of a built-in scene")->required();
     c->callback([this] { action = [this] { return check_command(checked, common); }; });
+  }
+
+  void add_keys() {
+    CLI::App* c = command("keys", "Every key of scene and body files: unit, default, what it is");
+    c->add_option("TABLE", keys_of, "One table alone, such as joints or bodies.segments");
+    c->callback([this] { action = [this] { return keys_command(keys_of, common); }; });
   }
 
   void add_modes() {

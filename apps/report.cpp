@@ -195,7 +195,7 @@ std::string page(const Folder& f) {
   h += "<h2>How wrong is it?</h2>\n<table>" + rows(s.at("error_budget")) +
        fmt::format("<tr><th>energy balance</th><td>{}</td></tr><tr><th>momentum drift</th><td>{}</td></tr></table>\n",
                    cell(s.at("energy_balance")), cell(s.at("momentum_drift")));
-  h += "<h2>What was flown</h2>\n" + bodies_table(s.at("bodies")) + "<ul>\n";
+  h += "<h2>What was simulated</h2>\n" + bodies_table(s.at("bodies")) + "<ul>\n";
   for (const json& line : s.at("plan")) h += "<li>" + escaped(line.get<std::string>()) + "</li>\n";
   for (const json& line : s.at("warnings")) h += "<li><b>warning:</b> " + escaped(line.get<std::string>()) + "</li>\n";
   h += "</ul><h2>The run</h2><table>" + rows(s) + rows(s.at("seconds"), "wall seconds: ") + "</table>\n";

@@ -79,8 +79,6 @@ void check_integrator(Faults& faults, const Scene& scene) {
 }
 
 void check_hub(Faults& faults, const Scene& scene) {
-  check_keys(faults, "hub", scene.hub, hub_keys);
-  check_keys(faults, "initial", scene, initial_keys);
   if (!scene.hub.fixed) return;
   if (scene.bodies.empty()) faults.add("hub.fixed", "is true and there is no body: nothing moves");
   const auto at_rest = [&](const char* path, const Vector3d& v) {
@@ -100,7 +98,6 @@ void check_directions(Faults& faults, const std::string& path, const Hinge& hing
 }
 
 void check_hinge(Faults& faults, const std::string& path, const HingeScene& hinge) {
-  check_keys(faults, path, hinge, hinge_keys);
   check_directions(faults, path, hinge.hinge);
   Joint with_law;
   with_law.mechanism = hinge.hinge.mechanism, with_law.law = hinge.law;
@@ -161,6 +158,7 @@ void check_connections(Faults& faults, const Scene& scene) {
 }  // namespace
 
 void check_shorthand(const Scene& scene, Faults& faults) {
+  check_keys(faults, "", scene, shorthand_keys);
   check_hub(faults, scene);
   for (size_t i = 0; i < scene.bodies.size(); ++i)
     if (scene.bodies[i].name == "hub" && !scene.hub.fixed)
@@ -170,22 +168,19 @@ void check_shorthand(const Scene& scene, Faults& faults) {
 }
 
 void check_scene(const Scene& scene, Faults& faults) {
-  check_keys(faults, "", scene, settings_keys);
-  check_keys(faults, "accuracy", scene, accuracy_keys);
-  check_keys(faults, "integrator", scene, integrator_keys);
+  check_keys(faults, "", scene, scene_keys_of_file);
   check_times(faults, scene);
   check_integrator(faults, scene);
   if (!scene.is_tree) check_hub(faults, scene);
-  if (scene.orbit) check_keys(faults, "orbit", *scene.orbit, orbit_keys);
   const bool in_field = scene.orbit && scene.orbit->gravity != "none";
   if (in_field && scene.hub.fixed)
-    faults.add("orbit.gravity", "acts on bodies that fly, but hub.fixed is true; drop one of them");
+    faults.add("orbit.gravity", "acts on bodies in orbit, but hub.fixed is true; drop one of them");
   if (in_field && !scene.gravity.isZero(0))
     faults.add("gravity", "is uniform, and orbit.gravity is that of the Earth; drop one of them");
   for (const JointScene& j : scene.joints)
     if (in_field && j.a.body.empty() && j.kind != JointKind::free)
       faults.add("orbit.gravity",
-                 fmt::format("acts on bodies that fly, but joint {} holds one in the frame of the orbit", j.name));
+                 fmt::format("acts on bodies in orbit, but joint {} holds one in the frame of the orbit", j.name));
   for (size_t i = 0; i < scene.bodies.size(); ++i) check_body(scene.bodies[i], fmt::format("bodies[{}]", i), faults);
   for (size_t i = 0; i < scene.hinges.size(); ++i) check_hinge(faults, fmt::format("hinges[{}]", i), scene.hinges[i]);
   check_body_names(faults, scene);

@@ -23,7 +23,7 @@ constexpr double least_size = 1e-50, most_size = 1e50;
 
 }  // namespace
 
-void check_positive(Faults& faults, const std::string& path, double value, std::string_view unit) {
+void positive(Faults& faults, const std::string& path, const double& value, std::string_view unit) {
   if (!(std::isfinite(value) && value > 0)) {
     faults.add(path, fmt::format("is {}{}; it must be positive", value, unit));
   } else if (value < least_size || value > most_size) {
@@ -32,7 +32,7 @@ void check_positive(Faults& faults, const std::string& path, double value, std::
   }
 }
 
-void check_not_negative(Faults& faults, const std::string& path, double value, std::string_view unit) {
+void not_negative(Faults& faults, const std::string& path, const double& value, std::string_view unit) {
   if (!(std::isfinite(value) && value >= 0)) {
     faults.add(path, fmt::format("is {}{}; it must be zero or positive", value, unit));
   } else if (value > 0 && value < least_size) {
@@ -41,35 +41,41 @@ void check_not_negative(Faults& faults, const std::string& path, double value, s
   }
 }
 
-void check_start(Faults& faults, const std::string& path, double value, std::string_view unit) {
+void start(Faults& faults, const std::string& path, const double& value, std::string_view unit) {
   constexpr double far = 1e4;  // of angles, 1600 turns: the digits that are left must tell contacts apart
-  check_finite(faults, path, value);
+  finite(faults, path, value, unit);
   if (std::abs(value) > far)
     faults.add(path, fmt::format("is {}{}; a start lies between {:g} and {:g}", value, unit, -far, far));
 }
 
-void check_finite(Faults& faults, const std::string& path, double value) {
+void finite(Faults& faults, const std::string& path, const double& value, std::string_view) {
   if (!std::isfinite(value)) faults.add(path, fmt::format("is {}; it must be a finite number", value));
 }
 
-void check_finite(Faults& faults, const std::string& path, const Vector3d& v) {
+void finite(Faults& faults, const std::string& path, const Vector3d& v, std::string_view) {
   if (!v.allFinite())
     faults.add(path, fmt::format("is [{}, {}, {}]; every entry must be a finite number", v.x(), v.y(), v.z()));
 }
 
-void check_unit(Faults& faults, const std::string& path, const Vector3d& v) {
+void direction(Faults& faults, const std::string& path, const Vector3d& v, std::string_view) {
   if (!(std::abs(v.norm() - 1) <= round_off))
     faults.add(path,
                fmt::format("is [{}, {}, {}] of length {}; it must be a unit vector", v.x(), v.y(), v.z(), v.norm()));
 }
 
-void check_name(Faults& faults, const std::string& path, const std::string& name) {
+void box(Faults& faults, const std::string& path, const Vector3d& sides, std::string_view unit) {
+  for (const double side : sides) not_negative(faults, path, side, unit);
+}
+
+void name(Faults& faults, const std::string& path, const std::string& name, std::string_view) {
   const auto allowed = [](unsigned char c) { return (c < 0x80 && std::isalnum(c)) || c == '_' || c == '-'; };
   if (name.empty() || !std::all_of(name.begin(), name.end(), allowed)) {
     faults.add(path, fmt::format("is {}; it must be one or more of the letters a-z, A-Z, digits, _ and -",
                                  toml_reader::quoted(name)));
   }
 }
+
+namespace {
 
 void check_inertia(Faults& faults, const std::string& path, const Matrix3d& inertia, bool may_vanish) {
   if (!inertia.allFinite()) return faults.add(path, "has an entry that is not finite; give 9 or 3 finite numbers");
@@ -95,6 +101,16 @@ void check_inertia(Faults& faults, const std::string& path, const Matrix3d& iner
   if (I(2) > (I(0) + I(1)) * (1 + round_off)) {
     faults.add(path, fmt::format("breaks the triangle inequality: {}; none can exceed the sum of the others", moments));
   }
+}
+
+}  // namespace
+
+void definite(Faults& faults, const std::string& path, const Matrix3d& inertia, std::string_view) {
+  check_inertia(faults, path, inertia, false);
+}
+
+void semidefinite(Faults& faults, const std::string& path, const Matrix3d& inertia, std::string_view) {
+  check_inertia(faults, path, inertia, true);
 }
 
 }  // namespace flexboom::scene_checks

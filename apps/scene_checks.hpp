@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-/// Checks of single values under their key paths. Written so that NaN fails where a value stands alone. Internal to
-/// `apps`.
+/// Checks of single values under their key paths, as descriptions of keys name them. Written so that NaN fails where a
+/// value stands alone. `unit` has a space in front. Internal to `apps`.
 namespace flexboom::scene_checks {
 
 inline constexpr double round_off = 1e-12;  // relative
@@ -18,20 +18,26 @@ inline constexpr double round_off = 1e-12;  // relative
 /// "bodies[0]", "name" -> "bodies[0].name".
 std::string join(const std::string& path, std::string_view key);
 
-void check_positive(toml_reader::Faults&, const std::string& path, double value, std::string_view unit);
-void check_not_negative(toml_reader::Faults&, const std::string& path, double value, std::string_view unit);
-void check_finite(toml_reader::Faults&, const std::string& path, double value);
+void positive(toml_reader::Faults&, const std::string& path, const double& value, std::string_view unit);
+void not_negative(toml_reader::Faults&, const std::string& path, const double& value, std::string_view unit);
+void finite(toml_reader::Faults&, const std::string& path, const double& value, std::string_view unit);
+void finite(toml_reader::Faults&, const std::string& path, const Eigen::Vector3d&, std::string_view unit);
 
 /// Of an angle, a length or their rates at the start: finite, and not so far away that nothing can be told apart.
-void check_start(toml_reader::Faults&, const std::string& path, double value, std::string_view unit);
-void check_finite(toml_reader::Faults&, const std::string& path, const Eigen::Vector3d&);
-void check_unit(toml_reader::Faults&, const std::string& path, const Eigen::Vector3d&);
+void start(toml_reader::Faults&, const std::string& path, const double& value, std::string_view unit);
+
+/// A unit vector.
+void direction(toml_reader::Faults&, const std::string& path, const Eigen::Vector3d&, std::string_view unit);
+
+/// Sides, none negative.
+void box(toml_reader::Faults&, const std::string& path, const Eigen::Vector3d&, std::string_view unit);
 
 /// Part of column names and file names: letters, digits, _ and -.
-void check_name(toml_reader::Faults&, const std::string& path, const std::string& name);
+void name(toml_reader::Faults&, const std::string& path, const std::string& name, std::string_view unit);
 
-/// Symmetric, positive definite (or, where a point mass is allowed, not negative), triangle inequality.
-void check_inertia(toml_reader::Faults&, const std::string& path, const Eigen::Matrix3d&, bool may_vanish);
+/// Of an inertia: symmetric, positive definite (or, where a point mass is allowed, not negative), triangle inequality.
+void definite(toml_reader::Faults&, const std::string& path, const Eigen::Matrix3d&, std::string_view unit);
+void semidefinite(toml_reader::Faults&, const std::string& path, const Eigen::Matrix3d&, std::string_view unit);
 
 /// Of the rows of a table.
 template <class Table>

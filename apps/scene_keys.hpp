@@ -13,44 +13,40 @@
 #include <variant>
 #include <vector>
 
-/// What the reader, the checks and the writer of scenes share: every name that a file may use is spelled here once.
-/// Internal to `apps`.
+/// What the description, the checks and the reader of scenes share. Internal to `apps`.
 namespace flexboom::scene_keys {
 
 inline constexpr std::string_view scene_format = "flexboom-scene-1";
 inline constexpr std::string_view body_format = "flexboom-body-1";
-inline constexpr std::array<std::string_view, 4> structures = {"beam", "solid", "eq14", "rigid"};
-inline constexpr std::array<std::string_view, 2> directions = {"hinge-plane", "all"};
-inline constexpr std::array<std::string_view, 2> theories = {"euler-bernoulli", "timoshenko"};  // order of BeamTheory
-inline constexpr std::array<std::string_view, 2> shear_rules = {"cowper", "nu-squared"};        // or a number
-inline constexpr std::array<std::string_view, 4> damping_rules = {"none", "modal", "loss-factor", "rayleigh"};
-
-inline constexpr std::array<std::string_view, 2> formulations = {"relative", "multipliers"};
-inline constexpr std::array<std::string_view, 3> stiffenings = {"auto", "on", "off"};
-inline constexpr std::array<std::string_view, 2> load_axes = {"body", "inertial"};
-inline constexpr std::array<std::string_view, 2> orbit_gravities = {"none", "differential"};
 inline constexpr std::string_view ground = "ground";  // the inertial frame as a body
 
-/// A dimension of a cross-section [m, m^2, m^4, -].
+/// A dimension of a cross-section.
 struct Dimension {
-  std::string_view key;
+  std::string_view key, unit, what;
   double* value;
   bool optional = false;
 };
 
-inline std::vector<Dimension> dimensions(RoundBar& s) { return {{"diameter", &s.diameter}}; }
-inline std::vector<Dimension> dimensions(Tube& s) { return {{"diameter", &s.diameter}, {"thickness", &s.thickness}}; }
-inline std::vector<Dimension> dimensions(Rectangle& s) { return {{"height", &s.height}, {"width", &s.width}}; }
+inline std::vector<Dimension> dimensions(RoundBar& s) {
+  return {{"diameter", "m", "outer one, of a round bar or a tube", &s.diameter}};
+}
+inline std::vector<Dimension> dimensions(Tube& s) {
+  return {{"diameter", "m", "", &s.diameter}, {"thickness", "m", "of the wall of a tube", &s.thickness}};
+}
+inline std::vector<Dimension> dimensions(Rectangle& s) {
+  return {{"height", "m", "of a rectangle or its tube, along y", &s.height},
+          {"width", "m", "of a rectangle or its tube, along z", &s.width}};
+}
 inline std::vector<Dimension> dimensions(RectangularTube& s) {
-  return {{"height", &s.height}, {"width", &s.width}, {"thickness", &s.thickness}};
+  return {{"height", "m", "", &s.height}, {"width", "m", "", &s.width}, {"thickness", "m", "", &s.thickness}};
 }
 inline std::vector<Dimension> dimensions(GeneralSection& s) {
-  return {{"A", &s.A},
-          {"Iy", &s.Iy},
-          {"Iz", &s.Iz},
-          {"J", &s.J},
-          {"kappa_y", &s.kappa_y, true},
-          {"kappa_z", &s.kappa_z, true}};
+  return {{"A", "m^2", "area of a general section", &s.A},
+          {"Iy", "m^4", "its second moment of area about y", &s.Iy},
+          {"Iz", "m^4", "about z", &s.Iz},
+          {"J", "m^4", "its torsion constant", &s.J},
+          {"kappa_y", "", "its shear coefficient along y", &s.kappa_y, true},
+          {"kappa_z", "", "along z", &s.kappa_z, true}};
 }
 inline std::vector<Dimension> dimensions(SectionShape& shape) {
   return std::visit([](auto& s) { return dimensions(s); }, shape);
@@ -70,20 +66,25 @@ inline SectionShape blank_shape(size_t index) {
 
 namespace flexboom {
 
-struct Scene;
+struct BeamSegment;
 struct BodyScene;
+struct Reading;
+struct Scene;
 
-/// Everything that can be said of the values themselves, under the key paths of a scene file or (for a body with an
-/// empty path) of a body file.
+/// Everything that can be said of the values themselves, under the key paths of a scene file.
 void check_scene(const Scene&, toml_reader::Faults&);
 
 /// [hub] and [[hinges]] of a scene with joints, before they are written out as joints.
 void check_shorthand(const Scene&, toml_reader::Faults&);
+
+/// What the keys of a body, each of them right, cannot be together. With an empty path: of a body file.
 void check_body(const BodyScene&, const std::string& path, toml_reader::Faults&);
 
-/// Joints, springs, loads, wheels and gravity: reading (apps/tree_scene_reader.cpp) and checking.
-void read_tree(toml_reader::TableReader&, Scene&);
+/// The same of joints, springs, loads, wheels and gravity.
 void check_tree(const Scene&, toml_reader::Faults&);
+
+/// Does the far end have other dimensions?
+bool is_tapered(const BeamSegment&);
 
 /// Decks write names in capitals: a marker that is not there as written is the one that differs by case alone. A place
 /// without marker or point on a body whose root moves in its frame is the root. A hub that is fixed is the inertial
@@ -99,11 +100,9 @@ void warn_of_oddities(const Scene&, std::vector<std::string>& warnings);
 /// Paths of every key that the readers of a scene look for, "bodies[].name".
 std::set<std::string> keys_known(const std::string& scene, const std::filesystem::path& folder);
 
-/// A place, functions of time: one, one per freedom, one per axis.
-PlaceScene read_place(toml_reader::TableReader&, std::string_view key);
-CourseScene read_course(toml_reader::TableReader&, std::string_view key);
-std::vector<CourseScene> read_courses(toml_reader::TableReader&, std::string_view key);
-std::array<CourseScene, 3> read_three_courses(toml_reader::TableReader&, std::string_view key);
+/// Takes over what the file holds that an entry of [[bodies]] names. A file that cannot be read is a fault of the whole
+/// entry.
+void read_file_of_body(toml_reader::TableReader& entry, Reading&, BodyScene&);
 
 /// Markers that a place on the body may name.
 std::vector<std::string> marker_names(const BodyScene&);

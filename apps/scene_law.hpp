@@ -1,25 +1,13 @@
 #pragma once
 
 #include "apps/toml_reader.hpp"
-#include "apps/toml_writer.hpp"
-#include "dynamics/hinge.hpp"
 #include "dynamics/joint_law.hpp"
 #include "dynamics/multibody.hpp"
 
 #include <string>
-#include <string_view>
-#include <vector>
 
-/// Keys of a JointLaw, which a joint and a hinge of the hub have alike. Internal to `apps`.
+/// Laws of joints in scenes and states. Internal to `apps`.
 namespace flexboom {
-
-/// Names of these keys.
-bool is_law_key(std::string_view);
-
-JointLaw read_law(toml_reader::TableReader&);
-
-/// Only what is there.
-void write_law(toml_writer::Writer&, const JointLaw&);
 
 /// What is wrong with a law and its start, under the keys of the table at `path`.
 void check_law(toml_reader::Faults&, const std::string& path, const Joint&, double start);

@@ -60,12 +60,3 @@ class Writer {
 };
 
 }  // namespace flexboom::toml_writer
-
-namespace flexboom {
-
-struct Scene;
-
-/// Joints, springs, loads and wheels.
-void write_tree(toml_writer::Writer&, const Scene&);
-
-}  // namespace flexboom

@@ -16,11 +16,11 @@ TimeCourse course_of(const CourseScene& course, double duration) {
   if (course.manoeuvre) return rest_to_rest(*course.manoeuvre);
   if (!course.table) return time_expression(course.expression);
   TimeCourse r = time_table(*course.table);
-  require(
-      r.begin <= 0 && r.end >= duration,
-      fmt::format("the table reaches from {:g} s to {:g} s, the flight from 0 to {:g} s; give more rows, or outside "
-                  "= \"hold\"",
-                  r.begin, r.end, duration));
+  require(r.begin <= 0 && r.end >= duration,
+          fmt::format(
+              "the table reaches from {:g} s to {:g} s, the simulation from 0 to {:g} s; give more times, or outside "
+              "= \"hold\"",
+              r.begin, r.end, duration));
   // An integrator may ask a little beyond the end.
   const auto within = [begin = r.begin, end = r.end](std::function<double(double)> f) {
     return [begin, end, f = std::move(f)](double t) { return f(std::clamp(t, begin, end)); };

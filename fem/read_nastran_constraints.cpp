@@ -47,14 +47,19 @@ std::vector<IdRange> id_list(Bulk& bulk, const Card& card, size_t first) {
   return list;
 }
 
+/// Without its nodes; the grid stands in field `at`, its components behind.
+RigidLine rigid_line(Bulk& bulk, const Card& card, const char* kind, long label, size_t at, const char* grid) {
+  return {fmt::format("{}_{}", kind, label),
+          bulk.cards.id(card, at, grid),
+          {},
+          component_flags(bulk.cards.components(card, at + 1)),
+          {},
+          card.at};
+}
+
 void read_rbe2(Bulk& bulk, const Card& card) {
   const long label = bulk.cards.id(card, 0, "element id");
-  RigidLine line{fmt::format("RBE2_{}", label),
-                 bulk.cards.id(card, 1, "GN"),
-                 {},
-                 component_flags(bulk.cards.components(card, 2)),
-                 {},
-                 card.at};
+  RigidLine line = rigid_line(bulk, card, "RBE2", label, 1, "GN");
   Card nodes = card;  // thermal expansion, a real number, may be last
   if (!nodes.fields.empty() && !to_integer(nodes.fields.back()) && nastran_real(nodes.fields.back()))
     nodes.fields.pop_back();
@@ -80,12 +85,7 @@ void read_rbar(Bulk& bulk, const Card& card) {
 
 void read_rbe3(Bulk& bulk, const Card& card) {
   const long label = bulk.cards.id(card, 0, "element id");
-  RigidLine line{fmt::format("RBE3_{}", label),
-                 bulk.cards.id(card, 2, "REFGRID"),
-                 {},
-                 component_flags(bulk.cards.components(card, 3)),
-                 {},
-                 card.at};
+  RigidLine line = rigid_line(bulk, card, "RBE3", label, 2, "REFGRID");
   double weight = 0;
   for (size_t i = 4; i < card.fields.size(); ++i) {
     const std::string_view field = card.field(i);

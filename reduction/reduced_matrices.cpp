@@ -16,15 +16,22 @@ using Eigen::Matrix3Xd;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-/// Sum of z z^T over many z, some hundred at a time: a product of dense blocks instead of updates of rank 1.
+/// Sum of z z^T over many columns z, some hundred at a time: a product of dense blocks instead of updates of rank 1.
 class GramSum {
  public:
-  explicit GramSum(Index size) : sum_(MatrixXd::Zero(size, size)), block_(size, 256) {}
+  explicit GramSum(Index size, Index at_a_time = 256) : sum_(MatrixXd::Zero(size, size)), block_(size, at_a_time) {}
 
   /// The next column z [times sqrt(dm)], to be written.
   MatrixXd::ColXpr next() {
     if (filled_ == block_.cols()) flush();
     return block_.col(filled_++);
+  }
+
+  void add(const MatrixXd& Z) {
+    if (filled_ + Z.cols() > block_.cols()) flush();
+    if (Z.cols() > block_.cols()) return add_gram(sum_, Z);
+    block_.middleCols(filled_, Z.cols()) = Z;
+    filled_ += Z.cols();
   }
 
   const MatrixXd& sum() {
@@ -125,33 +132,6 @@ MatrixXd gram_of_solids(const Mesh& mesh, const Assembly& assembly, const Matrix
   return (gram + gram.transpose()) / 2;
 }
 
-/// Sum of E E^T over many columns of E, some at a time: products of blocks that repay the call.
-class StrainSum {
- public:
-  explicit StrainSum(Index n) : sum_(MatrixXd::Zero(n, n)), block_(n, 2048) {}
-
-  void add(const MatrixXd& E) {
-    if (filled_ + E.cols() > block_.cols()) flush();
-    if (E.cols() > block_.cols()) return add_gram(sum_, E);
-    block_.middleCols(filled_, E.cols()) = E;
-    filled_ += E.cols();
-  }
-
-  const MatrixXd& sum() {
-    flush();
-    return sum_;
-  }
-
- private:
-  void flush() {
-    add_gram(sum_, block_.leftCols(filled_));
-    filled_ = 0;
-  }
-
-  MatrixXd sum_, block_;
-  Index filled_ = 0;
-};
-
 }  // namespace
 
 MatrixXd gram_matrix_by_points(const Mesh& mesh, const DofMap& dofs, const MatrixXd& Phi, int threads) {
@@ -175,8 +155,8 @@ MatrixXd gram_matrix(const Mesh& mesh, const Assembly& assembly, const MatrixXd&
 
 MatrixXd reduced_stiffness(const Mesh& mesh, const DofMap& dofs, const MatrixXd& Phi, int threads) {
   const MatrixXd lower = sum_over_elements(
-      mesh, threads, [&] { return StrainSum(Phi.cols()); },
-      [&](int e, StrainSum& sum) {
+      mesh, threads, [&] { return GramSum(Phi.cols(), 2048); },
+      [&](int e, GramSum& sum) {
         const Element& element = mesh.elements[static_cast<size_t>(e)];
         sum.add(type_of(element).energy_strains(mesh, element, Phi(dofs.of_element(mesh, e), Eigen::all)));
       });

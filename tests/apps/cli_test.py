@@ -298,6 +298,17 @@ class BadInput(Case):
         self.assert_exit(OK, result)
         self.assertAlmostEqual(json.loads(result.stdout)["mass"], 450, delta=1e-9)
 
+    def test_keys_of_one_table(self):
+        result = flexboom("keys", "bodies.segments")
+        self.assert_exit(OK, result)
+        self.assertIn("| `diameter` | m |", result.stdout)
+        self.assertNotIn("`duration`", result.stdout)
+        wheels = json.loads(flexboom("keys", "wheels", "--json").stdout)["[[wheels]]"]
+        self.assertEqual((wheels["inertia"]["unit"], wheels["spin"]["default"]), ("kg m^2", "0"))
+        result = flexboom("keys", "jonts")
+        self.assert_exit(INPUT, result)
+        self.assertIn('did you mean "joints"?', result.stderr)
+
     def test_check_as_json_lists_the_faults(self):
         result = flexboom("check", TESTS / "apps" / "broken" / "several_faults.toml", "--json")
         self.assert_exit(INPUT, result)
@@ -332,7 +343,7 @@ class Streams(Case):
         return {"run": ["run", "sport", "--no-budget", "--duration", "0.2", "--out", self.folder / "again"],
                 "reduce": ["reduce", BOOM4, "-o", self.folder / "again.h5"], "inspect": ["inspect", body],
                 "export": ["export", body, "--to", "coupling", "-o", self.folder / "boom.json"],
-                "check": ["check", "sport"], "check body": ["check", BOOM4], "modes": ["modes", BOOM4],
+                "check": ["check", "sport"], "keys": ["keys"], "check body": ["check", BOOM4], "modes": ["modes", BOOM4],
                 "compare": ["compare", BOOM4, "--count", "4"], "report": ["report", folder]}
 
     def test_quiet_prints_nothing(self):
@@ -580,8 +591,8 @@ class TreeScenes(Case):
         return folder
 
     def test_every_built_in_scene_flies(self):
-        for name in ("tumbling", "spin-up", "two-link-arm", "flexible-appendage", "wire-spinner", "panel-slew",
-                     "slider-crank"):
+        for name in ("tumbling", "spin-up", "two-link-arm", "flexible-appendage", "wing-satellite", "wire-spinner",
+                     "panel-slew", "slider-crank"):
             folder = self.run_scene(name, "--duration", "0.2", out=name)
             values = columns(folder / "trajectory.csv")
             self.assertAlmostEqual(values["t"][-1], 0.2)

@@ -211,68 +211,6 @@ TEST(Scene, ValidateFindsWhatAnOverrideBreaks) {
             std::string::npos);
 }
 
-std::vector<std::string> split(std::string text, const std::string& separator) {
-  std::vector<std::string> parts;
-  for (size_t end; (end = text.find(separator)) != std::string::npos; text.erase(0, end + separator.size()))
-    parts.push_back(text.substr(0, end));
-  parts.push_back(text);
-  return parts;
-}
-
-std::string without(const std::string& characters, std::string text) {
-  std::erase_if(text, [&](char c) { return characters.find(c) != std::string::npos; });
-  return text;
-}
-
-/// What a file may leave out is in meshes/README.md with the value that it then has.
-TEST(Scene, ReadmeNamesTheDefaultsOfTheProgram) {
-  const std::string least = R"(format = "flexboom-scene-1"
-name = "least"
-orbit = {}
-hub = { mass = 8.5, inertia = [0.1, 0.12, 0.05] }
-[[bodies]]
-name = "boom"
-segments = [{ shape = "round-bar", diameter = 0.01, length = 0.3, material = { E = 7e10, nu = 0.3, rho = 2700 } }]
-[[hinges]]
-body = "boom"
-point = [0, 0, 0]
-stowed = [0, 1, 0]
-outward = [1, 0, 0]
-stiffness = 0.2
-)";
-  std::map<std::string, std::string> of_program;
-  for (const std::string& line : split(to_toml(parse_scene(least, "scene.toml")), "\n"))
-    if (const auto sides = split(split(line, "  #")[0], " = "); sides.size() == 2)
-      of_program.try_emplace(sides[0], sides[1]);
-  const std::string readme = text_of(meshes / "README.md");
-  int compared = 0;
-  for (const std::string section : {"### Scene, ", "### Body, "})
-    for (const std::string& row : split(split(split(readme, section).at(1), "\n### ")[0], "\n")) {
-      if (row.starts_with("`[solid]`")) break;
-      const std::vector<std::string> cells = split(row, " | ");
-      if (cells.size() != 3) continue;
-      std::vector<std::string> keys = split(without("|,", cells[0]), " ");
-      const std::vector<std::string> defaults = split(without("`| ", cells[2]), ",");
-      std::erase_if(keys, [](const std::string& key) { return !key.starts_with("`") || key.starts_with("`["); });
-      for (size_t i = 0; i < keys.size() && keys.size() == defaults.size(); ++i) {
-        const auto found = of_program.find(without("`", keys[i]));
-        const std::string& stated = defaults[i];
-        if (found == of_program.end() || stated.empty()) continue;
-        char* end = nullptr;
-        const double number = std::strtod(stated.c_str(), &end);
-        const bool is_number = *end == '\0';
-        if (!is_number && stated[0] != '"' && stated != "true" && stated != "false" && stated != "[]") continue;
-        if (is_number) {
-          EXPECT_EQ(std::stod(found->second), number) << row;
-        } else {
-          EXPECT_EQ(found->second, stated) << row;
-        }
-        ++compared;
-      }
-    }
-  EXPECT_GE(compared, 25);
-}
-
 TEST(Scene, EveryFaultIsReportedInOneGo) {
   const std::string text =
       with(with(with(full_scene, "duration = 3", "duration = 0"), "nu = 0.3", "nu = 0.6"), "modes", "mode");

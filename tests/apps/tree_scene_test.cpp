@@ -2,6 +2,7 @@
 
 #include "apps/scene.hpp"
 #include "apps/simulate.hpp"
+#include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
 
 #include "fem/check.hpp"
@@ -63,6 +64,28 @@ TEST(TreeScene, Flies) {
   EXPECT_FALSE(has("lift.drive"));  // it is given
 }
 
+// The worked example of meshes/README.md.
+TEST(TreeScene, WingSatelliteMovesTheSameInBothFormulations) {
+  Scene scene = load_scene("wing-satellite");
+  scene.duration = 5.2;  // both panels reach their stops
+  scene.tolerance = 1e-7;
+  scene.error_budget = false;
+  const RunResult relative = run_scene(scene, {});
+  scene.formulation = "multipliers";
+  const RunResult multipliers = run_scene(scene, {});
+  const auto &one = relative.trajectory.events, &two = multipliers.trajectory.events;
+  ASSERT_EQ(one.size(), 4u);  // outer, inner, outer lets go, outer again
+  ASSERT_EQ(two.size(), one.size());
+  for (size_t i = 0; i < one.size(); ++i) EXPECT_NEAR(one[i].time, two[i].time, 1e-6);
+  for (const char* name :
+       {"hub.rotation.x", "hub.rotation.z", "inner.angle", "outer.angle", "boom.tip.y", "wheel.spin"}) {
+    const Eigen::VectorXd a = column(relative, name), b = column(multipliers, name);
+    EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-6 * a.cwiseAbs().maxCoeff()) << name;
+  }
+  EXPECT_GT(column(relative, "hub.rotation.z").tail(1)[0], 0.05);  // the wing opens the other way
+  EXPECT_LT(relative.trajectory.summary.energy_balance, 1e-8);
+}
+
 TEST(TreeScene, TakesBodiesReducedBefore) {
   const Scene plain = load_scene("flexible-appendage");
   const std::filesystem::path file = std::filesystem::temp_directory_path() / "flexboom-tree-scene.h5";
@@ -97,7 +120,8 @@ TEST(TreeScene, TurnsAreReadCheckedAndWrittenBack) {
   const struct {
     const char *old, *replacement, *words;
   } cases[] = {
-      {"profile = \"trapezoid\"", "profile = \"trapezium\"", "turns[0]: manoeuvre: profile 'trapezium' is not known"},
+      {"profile = \"trapezoid\"", "profile = \"trapezium\"",
+       "turns[0].profile: is \"trapezium\"; did you mean \"trapezoid\"?"},
       {"peak_rate = 0.1", "peak_rate = 0.0", "turns[0]: manoeuvre: peak rate"},
       {"pause = 10.0", "pause = -10.0", "turns[0].pause: is -10 s"},
       {"pause = 10.0", "paus = 10.0", "turns[0].paus: unknown key; did you mean \"pause\"?"},
