@@ -10,6 +10,6 @@ namespace flexboom {
 /// mass centre stays in the middle. Returns a canvas, its words, data and program.
 /// `rows`: trajectory.csv of the scene. `kept`: where bodies are kept that take long.
 /// @throws InputError, NumericalError as the bodies' making.
-std::string animation_html(const Scene&, const OutputTable& rows, const std::filesystem::path& kept);
+std::string animation_html(const Scene&, const OutputTable& table, const std::filesystem::path& kept);
 
 }  // namespace flexboom

@@ -105,9 +105,8 @@ void check_eq14(Faults& faults, const std::string& path, const BodyScene& body) 
   if (!fault.empty()) {
     faults.add(
         join(path, "structure"),
-        fmt::format(
-            "is \"eq14\", the closed form of one uniform segment with mass, clamped at \"root\"; {}; use \"beam\"",
-            fault));
+        fmt::format(R"(is "eq14", the closed form of one uniform segment with mass, clamped at "root"; {}; use "beam")",
+                    fault));
   }
   if (body.directions == "all" && !body.modes_auto && body.modes % 2 != 0)
     faults.add(join(path, "modes"),
@@ -212,7 +211,7 @@ void check_basis(Faults& faults, const std::string& path, const BodyScene& body)
   if (!faults.clean(join(path, "basis"))) return;
   const auto belongs = [&](bool given, const char* key, std::string_view name) {
     if (given && basis.name != name)
-      faults.add(join(path, key), fmt::format("belongs to basis = \"{}\", this one is \"{}\"", name, basis.name));
+      faults.add(join(path, key), fmt::format(R"(belongs to basis = "{}", this one is "{}")", name, basis.name));
   };
   belongs(!basis.interfaces.empty(), "interfaces", "craig-bampton");
   belongs(!basis.reference.empty(), "reference", "craig-bampton");
@@ -225,7 +224,7 @@ void check_basis(Faults& faults, const std::string& path, const BodyScene& body)
                                                 "\"solid\", not \"{}\"",
                                                 basis.name, body.structure));
   if (!basis.corrections.empty() && !elements)
-    faults.add(join(path, "corrections"), "need finite elements: structure \"beam\" or \"solid\"");
+    faults.add(join(path, "corrections"), R"(need finite elements: structure "beam" or "solid")");
   if (basis.name == "craig-bampton") check_interfaces(faults, path, body);
   for (const std::string& text : basis.corrections) try {
       const auto [set, direction] = place_and_direction("is not understood", text);
@@ -245,7 +244,7 @@ void check_stiffening(Faults& faults, const std::string& path, const BodyScene& 
     faults.add(join(path, "stiffening"), body.reduced
                                              ? "is \"on\", but the file has no geometric stiffness; make it anew with "
                                                "`flexboom reduce`, or say \"off\""
-                                             : "is \"on\", but structure \"eq14\" has none; use \"beam\", or \"off\"");
+                                             : R"(is "on", but structure "eq14" has none; use "beam", or "off")");
 }
 
 }  // namespace

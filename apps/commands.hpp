@@ -103,12 +103,12 @@ struct CompareArguments {
 
 // One function per command; each returns its exit code and throws InputError or NumericalError.
 int run_command(const RunArguments&, const CommonOptions&);
-int check_command(const std::string& scene, const CommonOptions&);
+int check_command(const std::string& name, const CommonOptions&);
 int keys_command(const std::string& table, const CommonOptions&);
 int modes_command(const ModesArguments&, const CommonOptions&);
 int mesh_command(const MeshArguments&, const CommonOptions&);
 int reduce_command(const ReduceArguments&, const CommonOptions&);
-int inspect_command(const std::filesystem::path& body, const CommonOptions&);
+int inspect_command(const std::filesystem::path& file, const CommonOptions&);
 int export_command(const ExportArguments&, const CommonOptions&);
 int bench_modes_command(const BenchArguments&, const CommonOptions&);
 int bench_reduction_command(const BenchArguments&, const CommonOptions&);

@@ -17,7 +17,7 @@ Model body_model(const std::filesystem::path& path, const ModelOptions& options)
   if (options.structure) body.structure = *options.structure;
   const bool solid = body.structure == "solid";
   require(solid || body.structure == "beam" || body.structure == "eq14" || body.structure == "rigid",
-          fmt::format("--structure: \"{}\" is unknown; there are \"beam\" and \"solid\"", body.structure));
+          fmt::format(R"(--structure: "{}" is unknown; there are "beam" and "solid")", body.structure));
   require(solid || !options.element, "--element: is for solids; add --structure solid");
   require(solid || !options.accuracy, "--accuracy: is for solids; add --structure solid");
   if (options.order) (solid ? body.solid.order : body.geometry.order) = *options.order;

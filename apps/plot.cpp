@@ -121,8 +121,7 @@ std::string svg(const Plot& p) {
     const Curve& c = p.curves[i];
     const char* colour = colours[i % colours.size()];
     // every other curve is dashed, so that two that coincide are both seen
-    s += fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.3\"{} points=\"", colour,
-                     i % 2 ? dashes : "");
+    s += fmt::format(R"(<polyline fill="none" stroke="{}" stroke-width="1.3"{} points=")", colour, i % 2 ? dashes : "");
     for (const size_t k : thinned(c.y, 500)) {
       if ((p.log_x && c.x[k] <= 0) || (p.log_y && c.y[k] <= 0)) continue;
       s += fmt::format("{:.1f},{:.1f} ", px(ax.fraction(c.x[k])), py(ay.fraction(c.y[k])));

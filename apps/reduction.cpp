@@ -82,7 +82,7 @@ BasisOptions basis_options(const ReduceArguments& a, const Model& model) {
 
 /// Static solutions over the unknowns of a held body, by the factor of its modes where they were solved with this K.
 StaticSolver statics_of(const Mesh& mesh, const BasisModel& m, const ModalBasis& basis) {
-  if (basis.factor) return StaticSolver(basis.factor, basis.K);
+  if (basis.factor) return {basis.factor, basis.K};
   return static_solver(mesh, m.assembly, unknowns(mesh, m.assembly.dofs, m.held));
 }
 

@@ -3,6 +3,7 @@
 #include "apps/tree_flight.hpp"
 #include "apps/version.hpp"
 #include "fem/check.hpp"
+#include "fem/files.hpp"
 #include "fem/stopwatch.hpp"
 #include "fem/vtk.hpp"
 
@@ -17,6 +18,7 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -29,6 +31,8 @@ namespace {
 
 constexpr std::array result_files = {"summary.json", "trajectory.csv", "events.csv",  "state.toml",
                                      "scene.toml",   "motion.pvd",     "report.html", "overview.svg"};
+
+constexpr size_t unlimited = std::numeric_limits<size_t>::max();  // rows of long runs are read line by line
 
 bool same_file(const fs::path& a, const fs::path& b) {
   std::error_code error;
@@ -74,6 +78,7 @@ struct Head {
   std::uintmax_t bytes = 0;  // of both
 };
 Head head_of(const fs::path& path, bool keep_text, const std::function<bool(double)>& wanted) {
+  if (std::filesystem::exists(path)) require_regular_file(path, unlimited);
   std::ifstream in(path, std::ios::binary);
   require(static_cast<bool>(in), fmt::format("--continue: cannot read {}, to which rows would be added; give another "
                                              "folder by --out",
@@ -145,6 +150,7 @@ void ResultsFolder::begin(const RunResult& r) {
   skips_first_ = start_ > 0 && !on_grid(start_, r.scene.output_step);
   const fs::path frames = path_ / "motion.pvd";
   if (fs::exists(frames)) {
+    require_regular_file(frames);
     for (auto& frame : read_pvd(frames))
       if (frame.first < before) frames_before_.add(std::move(frame), r.scene.vtu_step);
     write_pvd(frames, frames_before_.files);

@@ -3,6 +3,7 @@
 #include "apps/results_folder.hpp"
 #include "dynamics/integrator.hpp"
 #include "fem/check.hpp"
+#include "fem/files.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -16,7 +17,6 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <fstream>
 #include <sstream>
 
 namespace flexboom {
@@ -100,9 +100,9 @@ void override_modes(Scene& scene, const std::string& text) {
 
 /// Did the run of this folder end, killed or failed, before it had a first state?
 bool never_flew(const std::filesystem::path& folder) {
-  std::ifstream summary(folder / "summary.json");
-  if (!summary || std::filesystem::exists(folder / "state.toml")) return false;
-  const nlohmann::json document = nlohmann::json::parse(summary, nullptr, false);
+  const std::filesystem::path file = folder / "summary.json";
+  if (!std::filesystem::exists(file) || std::filesystem::exists(folder / "state.toml")) return false;
+  const nlohmann::json document = nlohmann::json::parse(file_bytes(file), nullptr, false);
   if (!document.is_object() || !document.contains("status")) return false;
   return document["status"] == "running" || document["status"] == "failed";
 }

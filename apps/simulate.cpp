@@ -215,8 +215,8 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
   plan.push_back(
       fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
                   run.motion.summary.method, why_method(scene, run.motion.summary), scene.tolerance));
-  plan.push_back(scene.formulation == "multipliers" ? "formulation: redundant coordinates, joints by multipliers"
-                                                    : "formulation: relative coordinates");
+  plan.emplace_back(scene.formulation == "multipliers" ? "formulation: redundant coordinates, joints by multipliers"
+                                                       : "formulation: relative coordinates");
   describe_model(scene, run, plan);
   if (scene.orbit)
     plan.push_back(fmt::format("orbit: rate {:.6e} rad/s{}; differential gravity {}, {:.1e} 1/s^2", scene.orbit->rate(),

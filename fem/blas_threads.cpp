@@ -90,8 +90,8 @@ std::string better_blas_kernels() {
   if (std::ranges::find(fallbacks, openblas_text("openblas_get_corename")) == fallbacks.end()) return "";
   const std::string flags = processor_flags();
   const auto all = [&](std::initializer_list<const char*> names) {
-    return std::ranges::all_of(names,
-                               [&](const char* name) { return flags.find(fmt::format(" {} ", name)) != flags.npos; });
+    return std::ranges::all_of(
+        names, [&](const char* name) { return flags.find(fmt::format(" {} ", name)) != std::string::npos; });
   };
   if (!all({"avx2", "fma"})) return "";
   return all({"avx512f", "avx512dq", "avx512bw", "avx512vl"}) ? "SkylakeX" : "Haswell";

@@ -53,7 +53,7 @@ class Builder {
   void add_layer(int layer) {
     for (int c = 0; c < layers_[static_cast<size_t>(layer)].columns; ++c) {
       const std::array<ProfileCorner, 4> places = {{{c, layer}, {c + 1, layer}, {c + 1, layer + 1}, {c, layer + 1}}};
-      const auto singular = std::find_if(places.begin(), places.end(), [&](const ProfileCorner& p) {
+      const auto* const singular = std::find_if(places.begin(), places.end(), [&](const ProfileCorner& p) {
         return options_.levels > 0 && std::any_of(options_.corners.begin(), options_.corners.end(), [&](const auto& q) {
                  return p.column == q.column && p.plane == q.plane;
                });
@@ -65,7 +65,7 @@ class Builder {
         corners[i] = vertex(place.column, place.plane);
       }
       if (singular == places.end()) {
-        cells_.push_back({corners, layer});
+        cells_.emplace_back(corners, layer);
       } else {
         refine(corners, layer);
       }
@@ -89,7 +89,7 @@ class Builder {
       cells_.push_back({{inner, q[2], q[3], ad}, layer});
       q = {q[0], ab, inner, ad};
     }
-    cells_.push_back({q, layer});
+    cells_.emplace_back(q, layer);
   }
 
   int edge_point(int corner, int end, double f, int level, int run) {

@@ -159,7 +159,7 @@ class Elimination {
 
   /// Replaces pivots by what they follow; each replacement brings later pivots only, so it ends.
   void substitute() {
-    for (size_t i = 0; i < list_.size(); ++i) {
+    for (size_t i = 0; i < list_.size(); ++i) {  // NOLINT(modernize-loop-convert): the list grows meanwhile
       const int dof = list_[i];
       if (!is_pivot(dof) || value_[at(dof)] == 0) continue;
       const double factor = value_[at(dof)];

@@ -36,7 +36,7 @@ int GmshSource::integer(std::string_view what) {
 
 double GmshSource::real(std::string_view what) {
   if (!binary_) return reader_.real(what);
-  const double value = binary<double>(what);
+  const auto value = binary<double>(what);
   if (!std::isfinite(value)) fail(fmt::format("{} is not a finite number", what));
   return value;
 }

@@ -140,7 +140,7 @@ Metric metric(const LineTable& table, const MatrixX3d& X) {
   for (Index q = 0; q < result.volumes.size(); ++q) {
     const Matrix3d J = jacobian(slopes, q);
     result.volumes(q) = weight_at(table, q) * J.determinant();
-    result.G.push_back(J.inverse());
+    result.G.emplace_back(J.inverse());
   }
   return result;
 }

@@ -176,7 +176,7 @@ constexpr std::string_view procedures[] = {
 bool among(std::string_view name, const auto& list) { return std::ranges::count(list, name) > 0; }
 
 void read_keyword(Deck& deck, const Keyword& keyword) {
-  const auto row = std::ranges::find(table, keyword.name, &Row::name);
+  const auto* const row = std::ranges::find(table, keyword.name, &Row::name);
   if (row != table.end()) return row->read(deck, keyword);
   if (among(keyword.name, silent)) return;
   if (among(keyword.name, passed_over)) {

@@ -110,7 +110,7 @@ constexpr Refusal refusals[] = {
 };
 
 void read_card(Bulk& bulk, const Card& card) {
-  const auto row = std::ranges::find(table, card.name, &Row::name);
+  const auto* const row = std::ranges::find(table, card.name, &Row::name);
   if (row != table.end()) return row->read(bulk, card);
   if (std::ranges::count(without_effect, card.name) > 0) {
     bulk.notes.add(fmt::format("{} has no effect on the modes", card.name));

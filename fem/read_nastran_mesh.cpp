@@ -102,7 +102,7 @@ class Elements {
   void add(const SolidLine&);
   void add(const BeamLine&);
   int solid_property(const SolidLine&);
-  int beam_property(const BeamLine&, const BeamPropertyLine&, const Vector3d& axis);
+  int beam_property(const BeamLine&, const BeamPropertyLine&, const Vector3d& y);
   void require_different_labels() const;
   std::string name_of(std::string_view kind, long property) const {
     const auto name = names_.find(property);

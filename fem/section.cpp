@@ -26,7 +26,7 @@ bool is_nu_squared(const ShearRule& rule) { return rule.name == "nu-squared"; }
 
 void validate(const ShearRule& rule) {
   require(rule.name == "cowper" || is_nu_squared(rule) || is_number(rule),
-          fmt::format("shear rule: \"{}\" is not known; there are \"cowper\", \"nu-squared\", \"value\"", rule.name));
+          fmt::format(R"(shear rule: "{}" is not known; there are "cowper", "nu-squared", "value")", rule.name));
   if (is_number(rule)) require_positive(rule.value, "shear coefficient");
 }
 
@@ -149,7 +149,7 @@ Section section(const RectangularTube& tube, double nu, const ShearRule& rule) {
           fmt::format("rectangular tube: thickness {} m leaves no hole in {} m x {} m", tube.thickness, tube.height,
                       tube.width));
   require(!is_nu_squared(rule),
-          "shear rule \"nu-squared\": not known for a rectangular tube; use \"cowper\" (thin walls) or a number");
+          R"(shear rule "nu-squared": not known for a rectangular tube; use "cowper" (thin walls) or a number)");
   const double h = tube.height, w = tube.width, t = tube.thickness;
   const double hi = h - 2 * t, wi = w - 2 * t;  // hole
   const double hm = h - t, wm = w - t;          // midline

@@ -93,7 +93,8 @@ constexpr std::array<CellKind, 8> kinds = {{{"hex", 0, whole},
 std::span<const CellKind> cell_kinds() { return kinds; }
 
 const CellKind& cell_kind(std::string_view name) {
-  const auto found = std::find_if(kinds.begin(), kinds.end(), [&](const CellKind& kind) { return kind.name == name; });
+  const auto* const found =
+      std::find_if(kinds.begin(), kinds.end(), [&](const CellKind& kind) { return kind.name == name; });
   if (found != kinds.end()) return *found;
   std::string names;
   for (const CellKind& kind : kinds) names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", kind.name);

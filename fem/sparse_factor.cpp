@@ -175,7 +175,7 @@ struct SparseFactor::Impl {
   template <int width>
   void solve_by_rows(const Eigen::Ref<const Eigen::MatrixXd>& B, Eigen::Ref<Eigen::MatrixXd> X) {
     rows.resize((static_cast<size_t>(size) * width + 7) / 8);
-    double* const x = reinterpret_cast<double*>(rows.data());
+    auto* const x = reinterpret_cast<double*>(rows.data());
     for (Eigen::Index i = 0; i < size; ++i) {
       double* const row = x + width * static_cast<Eigen::Index>(place[static_cast<size_t>(i)]);
       for (Eigen::Index c = 0; c < B.cols(); ++c) row[c] = B(i, c);

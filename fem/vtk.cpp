@@ -47,7 +47,7 @@ struct ArrayWriter {
 
   template <class Number>
   void append(std::string_view type, const Text& name, Eigen::Index components, const std::vector<Number>& values) {
-    fmt::format_to(end_of(text), "<DataArray type=\"{}\" Name=\"{}\"", type, escaped(name));
+    fmt::format_to(end_of(text), R"(<DataArray type="{}" Name="{}")", type, escaped(name));
     if (components > 0) fmt::format_to(end_of(text), " NumberOfComponents=\"{}\"", components);
     fmt::format_to(end_of(text), " format=\"{}\">\n", binary ? "binary" : "ascii");
     binary ? append_binary(values) : append_text(components, values);
@@ -185,7 +185,7 @@ void write_pvd(const std::filesystem::path& path, const std::vector<std::pair<do
 }
 
 std::vector<std::pair<double, std::string>> read_pvd(const std::filesystem::path& path) {
-  constexpr std::string_view head = "<DataSet timestep=\"", middle = "\" part=\"0\" file=\"", end = "\"/>";
+  constexpr std::string_view head = "<DataSet timestep=\"", middle = R"(" part="0" file=")", end = "\"/>";
   std::vector<std::pair<double, std::string>> files;
   std::ifstream in(path, std::ios::binary);
   std::string line;

@@ -55,7 +55,7 @@ VtkSolid vtk_solid_of(const Element& element) {
     const int type = element.order == 1 ? hexahedron : element.order == 2 ? triquadratic : lagrange_hexahedron;
     return {type, row.name, element.order, vtk_hexahedron_order(element.order, type == lagrange_hexahedron)};
   }
-  const auto found = std::ranges::find(same_order, full_name(row.name), &VtkRow::row);
+  const auto* const found = std::ranges::find(same_order, full_name(row.name), &VtkRow::row);
   return {found->type, found->row, element.order, found->type == 13 ? linear_wedge_order : std::vector<int>{}};
 }
 

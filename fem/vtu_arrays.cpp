@@ -47,7 +47,7 @@ double real_at(const char* bytes) {
 
 template <class Number>
 std::optional<long> whole_at(const char* bytes) {
-  const Number value = number_at<Number>(bytes);
+  const auto value = number_at<Number>(bytes);
   if constexpr (std::is_floating_point_v<Number>) {
     if (!(std::abs(value) <= largest_whole) || std::trunc(value) != value) return {};
   } else if constexpr (std::is_same_v<Number, std::uint64_t>) {
@@ -75,7 +75,7 @@ constexpr std::array<NumberType, 10> number_types = {{
 }};
 
 const NumberType* type_of_array(pugi::xml_node array) {
-  const auto found =
+  const auto* const found =
       std::ranges::find(number_types, std::string_view(array.attribute("type").value()), &NumberType::name);
   return found == number_types.end() ? nullptr : &*found;
 }
@@ -139,11 +139,11 @@ void VtuArrays::check_root(pugi::xml_node root) {
   if (!is("type", "UnstructuredGrid")) refuse("type", "\"UnstructuredGrid\" (of ParaView: save as .vtu)");
   const bool big = is("byte_order", "BigEndian");
   if (!big && !is("byte_order", "LittleEndian") && !is("byte_order", ""))
-    refuse("byte_order", "\"LittleEndian\" or \"BigEndian\"");
+    refuse("byte_order", R"("LittleEndian" or "BigEndian")");
   swapped_ = big != (std::endian::native == std::endian::big);
   wide_header_ = is("header_type", "UInt64");
   if (!wide_header_ && !is("header_type", "UInt32") && !is("header_type", ""))
-    refuse("header_type", "\"UInt32\" or \"UInt64\"");
+    refuse("header_type", R"("UInt32" or "UInt64")");
   compressed_ = is("compressor", "vtkZLibDataCompressor");
   if (!compressed_ && !is("compressor", "")) refuse("compressor", "\"vtkZLibDataCompressor\", or there must be none");
   if (const pugi::xml_node data = root.child("AppendedData"))
@@ -193,7 +193,7 @@ std::vector<Number> VtuArrays::values(pugi::xml_node array, long count) const {
   const std::string_view format = array.attribute("format").value();
   if (format == "ascii") return text_values<Number>(array, count);
   if (format != "binary" && format != "appended")
-    fail(array, fmt::format("format {} is not \"ascii\", \"binary\" or \"appended\"", quoted(format)));
+    fail(array, fmt::format(R"(format {} is not "ascii", "binary" or "appended")", quoted(format)));
   const size_t expected = static_cast<size_t>(count) * type->size;
   std::string bytes = bytes_of(array, expected);
   if (bytes.size() != expected)

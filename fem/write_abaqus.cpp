@@ -141,7 +141,7 @@ std::string_view DeckWriter::deck_row(size_t e) const {
   const Element& element = mesh_.elements[e];
   const std::string_view row = type_of(element).name;
   if (row == "hex" && element.order == 1) return "C3D8I";
-  const auto found = std::ranges::find(deck_rows, row, &DeckRow::row);
+  const auto* const found = std::ranges::find(deck_rows, row, &DeckRow::row);
   require(found != deck_rows.end(),
           fmt::format("{} of order {} has no type in CalculiX; write .vtu or .msh", name_of(e), element.order));
   return found->deck;
@@ -247,11 +247,11 @@ void DeckWriter::write_beam_section(size_t i) {
     require(m.diameter == tube->diameter && m.thickness == tube->thickness, where("is tapered, which no deck holds"));
     put(", SECTION=PIPE\n{:.12e}, {:.12e}\n", tube->diameter / 2, tube->thickness);
   } else if (const auto* r = std::get_if<Rectangle>(&property.start)) {
-    const Rectangle& m = std::get<Rectangle>(middle);
+    const auto& m = std::get<Rectangle>(middle);
     require(m.height == r->height && m.width == r->width, where("is tapered, which no deck holds"));
     put(", SECTION=RECT\n{:.12e}, {:.12e}\n", r->height, r->width);
   } else if (const auto* box = std::get_if<RectangularTube>(&property.start)) {
-    const RectangularTube& m = std::get<RectangularTube>(middle);
+    const auto& m = std::get<RectangularTube>(middle);
     const bool uniform = m.height == box->height && m.width == box->width && m.thickness == box->thickness;
     require(uniform, where("is tapered, which no deck holds"));
     put(", SECTION=BOX\n{0:.12e}, {1:.12e}, {2:.12e}, {2:.12e}, {2:.12e}, {2:.12e}\n", box->height, box->width,

@@ -39,7 +39,7 @@ struct Part {
   const GmshKind* kind = nullptr;
   std::string_view row;  // "hex" of order 1 and 2 counts its nodes as no other row of the same kind
   Groups groups;
-  auto operator<=>(const Part&) const = default;
+  auto operator<=>(const Part&) const = default;  // NOLINT(modernize-use-nullptr): a false alarm at the zero behind <=>
 };
 
 /// What the file lists, sorted into entities. Tags of groups: properties first, since a reader takes an element's first

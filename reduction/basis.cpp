@@ -90,9 +90,9 @@ ModalBasis interface_basis(const Mesh& mesh, const BasisModel& m, const BasisOpt
 constexpr std::array makers = {clamped_basis, hinge_basis, mean_axis_basis, interface_basis};
 
 size_t row_of(const BasisOptions& o) {
-  const auto name = std::ranges::find(basis_names, o.name);
+  const auto* const name = std::ranges::find(basis_names, o.name);
   require(name != basis_names.end(),
-          fmt::format("basis: \"{}\" is unknown; there are \"{}\"", o.name, fmt::join(basis_names, "\", \"")));
+          fmt::format(R"(basis: "{}" is unknown; there are "{}")", o.name, fmt::join(basis_names, "\", \"")));
   return static_cast<size_t>(name - basis_names.begin());
 }
 

@@ -236,7 +236,7 @@ std::span<const ExportSetting> settings_42() { return settings_of_42; }
 
 File42 file_42(const ReducedBody& body, const ExportOptions& options) {
   require(body.frame == "clamped" || body.frame == "mean-axis",
-          fmt::format("body \"{}\": 42 takes clamped and mean-axis bodies, the frame of this one is \"{}\"", body.name,
+          fmt::format(R"(body "{}": 42 takes clamped and mean-axis bodies, the frame of this one is "{}")", body.name,
                       body.frame));
   const Index n = body.n();
   const RawIntegrals raw(body, "42");

@@ -89,7 +89,7 @@ Json json_of(const CouplingFile& file) {
 }
 
 CouplingFile file_of(const Json& json) {
-  require(json.value("format", "") == coupling_format, fmt::format("\"format\" must be \"{}\"", coupling_format));
+  require(json.value("format", "") == coupling_format, fmt::format(R"("format" must be "{}")", coupling_format));
   CouplingFile file;
   file.name = json.at("body").get<std::string>();
   file.frame = json.at("frame").get<std::string>();

@@ -205,7 +205,7 @@ void read_nodes(ReducedBody& body, const ExudynDictionary& file) {
     const auto& names = entry<std::vector<std::string>>(file, "markerNames");
     const auto& members = entry<IntegerMatrix>(file, "markerNodes");
     require(members.rows() == std::ssize(names) && members.cols() == nodes_per_marker,
-            "\"markerNodes\" must have six nodes for each of \"markerNames\"");
+            R"("markerNodes" must have six nodes for each of "markerNames")");
     for (Index i = 0; i < members.rows(); ++i) {
       body.markers.push_back(marker_of(names[static_cast<size_t>(i)], nodes, members.row(i)));
     }
@@ -251,7 +251,7 @@ void write_exudyn(const ReducedBody& body, const ExportOptions&, const std::file
   require(body.n() > 0, where() + "a rigid body needs no file; use ObjectRigidBody");
   require(body.frame != "free", where() +
                                     "the coordinates hold the rigid motions, which EXUDYN's reference frame has " +
-                                    "already; use a body of frame \"clamped\" or \"mean-axis\"");
+                                    R"(already; use a body of frame "clamped" or "mean-axis")");
   require(body.display.points.cols() > 0 || !body.markers.empty(), where() + "the body has neither points nor markers");
   body.validate();
   write_exudyn_dictionary(path, dictionary_of(body));
@@ -260,7 +260,7 @@ void write_exudyn(const ReducedBody& body, const ExportOptions&, const std::file
 std::vector<std::string> exudyn_cannot_hold(const ReducedBody& body) {
   std::vector<std::string> sentences;
   if (!body.De.isZero(0)) {
-    sentences.push_back(
+    sentences.emplace_back(
         "Damping: AddObjectFFRFreducedOrder takes Rayleigh factors only; De is in the file as dampingMatrixReduced, to "
         "be set on the object with mbs.SetObjectParameter.");
   }

@@ -86,13 +86,13 @@ void check_value(const ExportSetting& s, const std::string& value) {
   if (s.values.starts_with(text_kind)) return;
   if (s.values.starts_with(number_kind)) {
     require(to_real(value).has_value(),
-            fmt::format("export setting \"{}\" must be a number, got \"{}\"", s.name, value));
+            fmt::format(R"(export setting "{}" must be a number, got "{}")", s.name, value));
     return;
   }
   const std::string among = fmt::format("|{}|", s.values);
   require(!value.empty() && value.find('|') == std::string::npos &&
               among.find(fmt::format("|{}|", value)) != std::string::npos,
-          fmt::format("export setting \"{}\" must be one of {}, got \"{}\"", s.name, s.values, value));
+          fmt::format(R"(export setting "{}" must be one of {}, got "{}")", s.name, s.values, value));
 }
 
 std::string default_value(const ExportSetting& s) {

@@ -28,7 +28,7 @@ Eigen::MatrixXd inertial_forces(const Mesh&, const Assembly&);
 
 /// Unit forces and torques on a node set, freedoms x 6; x 3 of a lone node without rotations.
 /// @throws InputError unless the set exists and its nodes do not lie on a line.
-Eigen::MatrixXd marker_forces(const Mesh&, const DofMap&, const std::string& node_set);
+Eigen::MatrixXd marker_forces(const Mesh&, const DofMap&, const std::string& name);
 
 /// Sections of beams and bodies on nodes turn, and S has the linear part of that: theta x r. Adds what their inertial
 /// forces lack, their work on theta x (theta x r) / 2. Kg: one matrix per column of `fields`.

@@ -18,7 +18,7 @@ constexpr std::array<std::string_view, 6> loads = {"Fx", "Fy", "Fz", "Mx", "My",
 int add_reference_node(Mesh& mesh, const std::vector<int>& nodes, const InterfacePlan& plan) {
   require(plan.connection == "rigid" || plan.connection == "distributing",
           "interface \"" + plan.name + "\": connection \"" + plan.connection +
-              "\" is unknown; there are \"rigid\" and \"distributing\"");
+              R"(" is unknown; there are "rigid" and "distributing")");
   const auto reference = static_cast<int>(mesh.nodes.cols());
   const Eigen::Vector3d centre = mesh.nodes(Eigen::all, nodes).rowwise().mean();
   mesh.nodes.conservativeResize(Eigen::NoChange, reference + 1);

@@ -35,11 +35,11 @@ struct ModalBasis {
 std::vector<Coordinate> mode_table(const ModalBasis&);
 
 /// Takes an interface to a choice of coordinates: -1 when not all of its own are kept, one after the other.
-void renumber(Interface&, const std::vector<int>& list);
+void renumber(Interface&, const std::vector<int>& modes);
 
 /// The listed shapes of a basis, in that order. An interface that loses a coordinate has none any more.
 /// @throws InputError for an index that does not exist.
-ModalBasis selected(const ModalBasis&, const std::vector<int>& shapes);
+ModalBasis selected(const ModalBasis&, const std::vector<int>& modes);
 
 /// Modes of the mesh with the nodes of `clamp` fixed. Groups of equal frequencies are aligned to the body's axes
 /// (deflection of the tip along y first, then z, x, rotations), signs are fixed: positive tip deflection along the

@@ -231,7 +231,7 @@ void apply_damping(ReducedBody& body, const DampingRule& rule) {
     body.De = rule.alpha * body.Me + rule.beta * body.Ke;
   } else {
     throw InputError(where + " rule \"" + rule.name +
-                     "\" is unknown; there are \"none\", \"modal\", \"loss-factor\", \"rayleigh\"");
+                     R"(" is unknown; there are "none", "modal", "loss-factor", "rayleigh")");
   }
 }
 

@@ -298,6 +298,23 @@ class InPlace(Case):
         self.assert_exit(OK, flexboom("run", out / "scene.toml", "--duration", "0.4", "--continue", out, "--out", out))
         self.assertEqual(len(self.rows(out)), 42)
 
+    def test_only_files_are_read(self):
+        """A pipe that nobody writes to would be waited for, a line of /dev/zero never ends."""
+        good = self.run_sport("--duration", "0.2", "--vtu-step", "0.1")
+        for name in ("summary.json", "trajectory.csv", "events.csv", "motion.pvd"):
+            for device in (os.mkfifo, lambda path: os.symlink("/dev/zero", path)):
+                bad = self.folder / "bad"
+                shutil.copytree(good, bad)
+                (bad / name).unlink()
+                device(bad / name)
+                if name == "summary.json":  # read where there is no state
+                    (bad / "state.toml").unlink()
+                result = flexboom("run", "sport", "--no-budget", "--duration", "0.3", "--vtu-step", "0.1",
+                                  "--continue", bad, "--out", bad, timeout=20)
+                self.assert_exit(INPUT, result)
+                self.assertIn(f"{bad / name}: it is a device, pipe or socket, not a file", result.stderr)
+                shutil.rmtree(bad)
+
     def test_other_columns_are_refused_and_nothing_is_lost(self):
         out = self.run_sport("--duration", "0.2")
         text = (out / "trajectory.csv").read_text()
