@@ -5,7 +5,25 @@
 namespace flexboom {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+namespace {
+
+// Loops, for an expression of Eigen allocates a copy of the indices.
+void part(const MatrixXd& from, const std::vector<int>& rows, const std::vector<int>& columns, MatrixXd& to) {
+  to.resize(std::ssize(rows), std::ssize(columns));
+  for (Index j = 0; j < to.cols(); ++j)
+    for (Index i = 0; i < to.rows(); ++i)
+      to(i, j) = from(rows[static_cast<size_t>(i)], columns[static_cast<size_t>(j)]);
+}
+
+void part(const VectorXd& from, const std::vector<int>& rows, VectorXd& to) {
+  to.resize(std::ssize(rows));
+  for (Index i = 0; i < to.size(); ++i) to[i] = from[rows[static_cast<size_t>(i)]];
+}
+
+}  // namespace
 
 void NewtonMatrix::sort() {
   const auto n = static_cast<size_t>(J.rows());
@@ -30,9 +48,10 @@ void NewtonMatrix::sort() {
   }
   for (const int i : values_)
     coordinates_.push_back({i, place_[static_cast<size_t>(rate_of_[static_cast<size_t>(i)])]});
-  by_core_ = J(core_, core_);
-  by_values_ = J(core_, values_);
-  of_followers_ = J(followers_, Eigen::all);
+  part(J, core_, core_, by_core_);
+  part(J, core_, values_, by_values_);
+  of_followers_.resize(std::ssize(followers_), J.cols());
+  for (Index i = 0; i < of_followers_.rows(); ++i) of_followers_.row(i) = J.row(followers_[static_cast<size_t>(i)]);
 }
 
 void NewtonMatrix::factorise(double gamma) {
@@ -47,16 +66,14 @@ void NewtonMatrix::factorise(double gamma) {
 
 void NewtonMatrix::solve(const double* b, double* x) {
   all_ = Eigen::Map<const VectorXd>(b, J.rows());
-  values_b_ = all_(values_);
-  core_b_ = all_(core_);
+  part(all_, values_, values_b_);
+  part(all_, core_, core_b_);
   core_b_.noalias() += gamma_ * (by_values_ * values_b_);
   core_x_ = lu_.solve(core_b_);
-  all_(core_) = core_x_;
+  for (Index i = 0; i < core_x_.size(); ++i) all_[core_[static_cast<size_t>(i)]] = core_x_[i];
   for (const Coordinate& c : coordinates_) all_[c.value] += gamma_ * core_x_[c.rate];
-  followers_b_ = all_(followers_);
-  all_(followers_).setZero();
-  followers_x_.noalias() = of_followers_ * all_;
-  all_(followers_) = followers_b_ + gamma_ * followers_x_;
+  followers_x_.noalias() = of_followers_ * all_;  // their own columns are zero
+  for (Index i = 0; i < followers_x_.size(); ++i) all_[followers_[static_cast<size_t>(i)]] += gamma_ * followers_x_[i];
   Eigen::Map<VectorXd>(x, J.rows()) = all_;
 }
 

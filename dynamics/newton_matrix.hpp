@@ -32,7 +32,7 @@ class NewtonMatrix {
   double gamma_ = 0;
   Eigen::MatrixXd by_core_, by_values_, of_followers_, condensed_;
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
-  Eigen::VectorXd all_, core_b_, core_x_, values_b_, followers_b_, followers_x_;
+  Eigen::VectorXd all_, core_b_, core_x_, values_b_, followers_x_;
 };
 
 }  // namespace flexboom

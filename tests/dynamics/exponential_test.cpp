@@ -254,8 +254,9 @@ TEST(Exponential, ErrorIsThatOfTheTolerance) {
         size = size.cwiseMax(shape(reference.y[i]).cwiseAbs());
         error = error.cwiseMax(shape(r.y[i] - reference.y[i]).cwiseAbs());
       }
-      // Errors of steps add up, more where the hub turns what was wrong.
-      EXPECT_LT(error.cwiseQuotient(size).maxCoeff(), (fixed_hub ? 1.5 : 5) * tolerance) << fixed_hub << tolerance;
+      // Errors of steps add up, more where the hub turns what was wrong; from one step size of the ladder to the next
+      // they are 16 times as large.
+      EXPECT_LT(error.cwiseQuotient(size).maxCoeff(), (fixed_hub ? 3 : 5) * tolerance) << fixed_hub << tolerance;
     }
   }
 }
