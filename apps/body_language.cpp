@@ -26,8 +26,8 @@ constexpr std::array<std::string_view, 3> stiffenings = {"auto", "on", "off"};
 constexpr std::array<std::string_view, 2> theories = {"euler-bernoulli", "timoshenko"};  // order of BeamTheory
 constexpr std::array<std::string_view, 2> shear_rules = {"cowper", "nu-squared"};        // or a number
 constexpr std::array<std::string_view, 4> damping_rules = {"none", "modal", "loss-factor", "rayleigh"};
-constexpr std::array<std::string_view, 1> mode_counts = {"auto"};  // or a number
-constexpr std::array<std::string_view, 1> positions = {"tip"};     // or a number
+constexpr std::array<std::string_view, 1> mode_words = {"auto"};  // or a number
+constexpr std::array<std::string_view, 1> positions = {"tip"};    // or a number
 
 template <class T>
 void from_to(Faults& faults, const std::string& path, T value, T least, T most, const char* otherwise) {
@@ -200,7 +200,7 @@ void model_keys(Archive& a, BodyScene& b) {
   a.choice({"structure", "", "model of the body"}, structures, b.structure);
   a.key({"clamp", "", "node set that is fixed: `\"root\"`, `\"tip\"` or the name of an attachment"}, b.clamp);
   NumberOrWord modes{static_cast<double>(b.modes), b.modes_auto ? "auto" : "", true};
-  a.choice_or_number({"modes", "", "number of modes, 0 to 10000"}, mode_counts, modes, mode_count);
+  a.choice_or_number({"modes", "", "number of modes, 0 to 10000"}, mode_words, modes, mode_count);
   if (KeyReader* reader = a.reader()) {
     b.modes = static_cast<int>(modes.number), b.modes_auto = modes.word == "auto";
     b.modes_given = b.modes_given || reader->has("modes");

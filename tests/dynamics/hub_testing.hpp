@@ -42,7 +42,7 @@ class Hub {
   Hub(std::optional<ReducedBody> hub, std::vector<Appendage> booms, const std::optional<OrbitalField>& field = {})
       : hub_(hub.value_or(ReducedBody{})), booms_(booms), floats_(hub.has_value()), tree_([&] {
           Multibody scene = hub_with_booms(std::move(hub), std::move(booms), field);
-          if (floats_) std::ranges::rotate(scene.joints, scene.joints.begin() + 1);
+          if (floats_) std::rotate(scene.joints.begin(), scene.joints.begin() + 1, scene.joints.end());
           return scene;
         }()) {
     const TreeLayout& l = tree_.layout();
