@@ -49,6 +49,16 @@ void check_inputs(const fs::path& folder, const Scene& scene, const fs::path& in
               fmt::format("{} would be overwritten by the results; give another folder by --out", file.string()));
 }
 
+/// What a run needs of the folder in which it goes on, before it computes anything. @throws InputError.
+void check_earlier_run(const fs::path& folder) {
+  for (const char* name : {"trajectory.csv", "events.csv"})
+    require(fs::exists(folder / name), fmt::format("--continue: {} is missing, to which rows would be added; give "
+                                                   "another folder by --out",
+                                                   (folder / name).string()));
+  for (const char* name : result_files)
+    if (fs::exists(folder / name)) require_regular_file(folder / name, unlimited);
+}
+
 /// Adds to a file that is there. @throws InputError.
 void append(const fs::path& path, const std::function<void(std::ostream&)>& write) {
   errno = 0;
@@ -78,7 +88,6 @@ struct Head {
   std::uintmax_t bytes = 0;  // of both
 };
 Head head_of(const fs::path& path, bool keep_text, const std::function<bool(double)>& wanted) {
-  if (std::filesystem::exists(path)) require_regular_file(path, unlimited);
   std::ifstream in(path, std::ios::binary);
   require(static_cast<bool>(in), fmt::format("--continue: cannot read {}, to which rows would be added; give another "
                                              "folder by --out",
@@ -111,7 +120,7 @@ bool on_grid(double t, double step) {
 ResultsFolder::ResultsFolder(fs::path path, const Scene& scene, const fs::path& input)
     : path_(std::move(path)), goes_on_(scene.from && same_file(scene.from->file(), path_ / "state.toml")) {
   if (scene.from) start_ = scene.from->time();
-  if (!goes_on_) check_inputs(path_, scene, input);
+  goes_on_ ? check_earlier_run(path_) : check_inputs(path_, scene, input);
   std::error_code error;
   fs::create_directories(path_, error);
   require(!error, fmt::format("cannot make the output folder {}: {}", path_.string(), error.message()));
@@ -150,7 +159,6 @@ void ResultsFolder::begin(const RunResult& r) {
   skips_first_ = start_ > 0 && !on_grid(start_, r.scene.output_step);
   const fs::path frames = path_ / "motion.pvd";
   if (fs::exists(frames)) {
-    require_regular_file(frames);
     for (auto& frame : read_pvd(frames))
       if (frame.first < before) frames_before_.add(std::move(frame), r.scene.vtu_step);
     write_pvd(frames, frames_before_.files);

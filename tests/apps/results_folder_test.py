@@ -315,6 +315,14 @@ class InPlace(Case):
                 self.assertIn(f"{bad / name}: it is a device, pipe or socket, not a file", result.stderr)
                 shutil.rmtree(bad)
 
+    def test_a_missing_table_is_named(self):
+        for name in ("trajectory.csv", "events.csv"):
+            out = self.run_sport("--duration", "0.2")
+            (out / name).unlink()
+            result = flexboom("run", "sport", "--duration", "0.3", "--continue", out, "--out", out)
+            self.assert_exit(INPUT, result)
+            self.assertIn(f"{out / name} is missing", result.stderr)
+
     def test_other_columns_are_refused_and_nothing_is_lost(self):
         out = self.run_sport("--duration", "0.2")
         text = (out / "trajectory.csv").read_text()
