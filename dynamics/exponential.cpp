@@ -118,7 +118,7 @@ class ExponentialStepper final : public Stepper {
     reached_state_ = y;
   }
 
-  /// By the linear part alone, with the remainder as it is at the start.
+  /// By the linear part alone, with the remainder as it is at the start: as far as that part is good for.
   void predict(double t_end, const std::function<void(const VectorXd& y)>& look) override {
     const double left = t_end - step_.start;
     step_.M.setZero();
@@ -131,7 +131,7 @@ class ExponentialStepper final : public Stepper {
       step_.linear->to_x(integral_, y.head(nx_));
       motion_.turn(step_, scratch_, 1, y);
       motion_.place(step_, 1, y);
-      if (y.allFinite()) look(y);
+      if (y.allFinite() && serves(*step_.linear, y)) look(y);
     }
   }
 
