@@ -73,7 +73,10 @@ class Array {
   void add(const Numbers& numbers) {
     for (const double v : numbers) add(v);
   }
-  void add(double v) { fmt::format_to(std::back_inserter(text_), "{}{:.6g}", separator(), v); }
+  /// Below a picometre is round-off.
+  void add(double v) {
+    fmt::format_to(std::back_inserter(text_), "{}{:.6g}", separator(), std::abs(v) < 1e-12 ? 0.0 : v);
+  }
   void add(const std::string& text) { fmt::format_to(std::back_inserter(text_), "{}{}", separator(), text); }
   std::string text() const { return "[" + fmt::to_string(text_) + "]"; }
 

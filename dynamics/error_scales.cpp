@@ -23,7 +23,8 @@ ErrorScales::ErrorScales(const Tree& tree, const VectorXd& y0, double tolerance,
       rescale_(rescale),
       start_attitude_(tree.scene().joints.size(), Vector4d(1, 0, 0, 0)),
       period_(tree.scene().joints.size(), 0.0),
-      largest_(VectorXd::Zero(y0.size())) {
+      largest_(VectorXd::Zero(y0.size())),
+      own_(VectorXd::Zero(y0.size())) {
   error_.tolerance = tolerance;
   for (size_t i = 0; i < period_.size(); ++i) {
     const TreeLayout::Joint& place = tree.layout().joints[i];
@@ -38,6 +39,7 @@ ErrorScales::ErrorScales(const Tree& tree, const VectorXd& y0, double tolerance,
 }
 
 void ErrorScales::observe(const VectorXd& y) {
+  own_ = own_.cwiseMax(y.cwiseAbs());
   for_each_size(y, [&](int i, double size) {
     if (size <= largest_[i]) return;
     largest_[i] = size;
@@ -60,7 +62,7 @@ void ErrorScales::raise(int state, double size) {
 void ErrorScales::restart(const VectorXd& y) {
   if (!rescale_) return;
   const int motion = tree_.layout().spin;
-  largest_.head(motion).setZero();
+  largest_.head(motion).setZero(), own_.head(motion).setZero();
   error_.scale.head(motion) = floor_.head(motion) * 1e-50;
   observe(y);
 }
@@ -90,16 +92,21 @@ void ErrorScales::for_each_size(const VectorXd& y, const Each& each) const {
     const double angle = rotation_vector(quaternion_product(back, y.segment<4>(j.attitude))).norm();
     for (int k = 0; k < 4; ++k) each(j.attitude + k, std::min(1.0, 0.5 * angle));
   }
-  for (size_t b = 0; b < l.q.size(); ++b) {  // by energy: what the coordinate with the most has, were it in this one
+  // Elastic coordinates by energy: what the one with the most has, were it in this one. Each is an output, too: no more
+  // than ten times its own size.
+  const auto elastic = [&](int i, double size) {
+    const double own = std::abs(y[i]);
+    each(i, std::max(own, std::min(size, 10 * std::max(own, own_[i]))));
+  };
+  for (size_t b = 0; b < l.q.size(); ++b) {
     const ReducedBody& body = tree_.scene().bodies[b];
     const int q = l.q[b], q_dot = l.rate(q);
     double held = 0;
     for (int k = 0; k < body.n(); ++k)
       held = std::max(held, body.Ke(k, k) * y[q + k] * y[q + k] + body.Me(k, k) * y[q_dot + k] * y[q_dot + k]);
     for (int k = 0; k < body.n(); ++k) {
-      const double own = std::abs(y[q + k]);
-      each(q + k, body.Ke(k, k) > 0 ? std::max(own, std::sqrt(held / body.Ke(k, k))) : own);
-      each(q_dot + k, std::sqrt(held / body.Me(k, k)));
+      elastic(q + k, body.Ke(k, k) > 0 ? std::sqrt(held / body.Ke(k, k)) : 0.0);
+      elastic(q_dot + k, std::sqrt(held / body.Me(k, k)));
     }
   }
   for (size_t i = 0; i < tree_.scene().wheels.size(); ++i)

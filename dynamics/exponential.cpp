@@ -214,6 +214,9 @@ class ExponentialStepper final : public Stepper {
       }
     }
     MatrixXd J = problem_->linear(step_.start, base.data(), contact_, 0, nx_);
+    if (const double largest = J.cwiseAbs().maxCoeff(); !(largest * largest < std::numeric_limits<double>::max()))
+      throw NumericalError(fmt::format(  // no other method could, so this is no failure of the method
+          "the Jacobian of the equations of motion has entries of {:.2g}, whose squares overflow", largest));
     for (const int i : layout_.prescribed) J.row(i).setZero(), J.col(i).setZero();
     for (const SplitLayout::Coordinate& c : layout_.coordinates) hold(J, c);
     std::vector<int> omegas;
