@@ -29,12 +29,10 @@ bool is_isolated(const Multibody& scene) {
   return scene.loads.empty() && scene.gravity.isZero(0) && !scene.field && !is_held(scene);
 }
 
-Conservation::Conservation(double mass, double inertia, const MotionScales& before)
-    : mass_(mass), inertia_(inertia), largest_(before) {}
-
 Conservation::Conservation(const std::vector<ReducedBody>& bodies, const MotionScales& before)
-    : Conservation(sum_of(bodies, [](const ReducedBody& b) { return b.m; }),
-                   sum_of(bodies, [](const ReducedBody& b) { return b.J0.trace(); }), before) {}
+    : mass_(sum_of(bodies, [](const ReducedBody& b) { return b.m; })),
+      inertia_(sum_of(bodies, [](const ReducedBody& b) { return b.J0.trace(); })),
+      largest_(before) {}
 
 double Conservation::energy_balance() const {
   return largest_.energy > no_motion(inertia_) ? gap_ / largest_.energy : 0;

@@ -19,9 +19,7 @@ bool is_isolated(const Multibody&);
 /// How well a flight keeps its energy and its momenta, over its outputs.
 class Conservation {
  public:
-  /// `mass`, `inertia`: of all bodies, the trace about each one's own origin [kg], [kg m^2]: what makes a motion slow.
   /// `before`: of a flight that this one goes on.
-  Conservation(double mass, double inertia, const MotionScales& before);
   Conservation(const std::vector<ReducedBody>&, const MotionScales& before);
 
   /// The next moment: `total` is kept, `size` its largest part [J]. A balance has momenta and their scales.
@@ -42,7 +40,7 @@ class Conservation {
   double momentum_drift() const;  // largest change of both momenta, each by its scale
 
  private:
-  double mass_, inertia_;
+  double mass_, inertia_;  // of all bodies, the trace about each one's own origin: what makes a motion slow
   MotionScales largest_;
   bool begun_ = false;
   double first_total_ = 0, gap_ = 0, dP_ = 0, dH_ = 0;

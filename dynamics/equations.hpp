@@ -8,7 +8,6 @@
 #include "dynamics/spatial.hpp"
 
 #include <cmath>
-#include <type_traits>
 #include <vector>
 
 namespace flexboom::equations {
