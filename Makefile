@@ -13,7 +13,7 @@ packages := g++ cmake ninja-build \
 format tidy: packages += clang-format clang-tidy
 asan build-asan fuzz: packages += clang libclang-rt-14-dev
 
-sources = $(wildcard $(foreach folder,fem reduction dynamics apps tests tests/* tests/install/*,$(folder)/*.hpp $(folder)/*.cpp))
+sources = $(shell find fem reduction dynamics apps tests -name '*.[ch]pp')
 
 help:
 	@echo "make run           build, simulate the scene sport, write results/sport and its report"
@@ -65,7 +65,7 @@ format-check:
 tidy: install-deps
 	cmake --preset tidy
 	run-clang-tidy -quiet -p build/tidy -j $(JOBS) -checks=-bugprone-suspicious-include \
-	  '(/unity_[0-9]+_cxx\.cxx|/(fem|reduction|dynamics|apps)/[a-z0-9_]+\.cpp)$$'
+	  '(/unity_[0-9]+_cxx\.cxx|/(fem|reduction|dynamics|apps)/[a-z0-9_/]+\.cpp)$$'
 
 install-deps:
 	@if ! command -v apt-get >/dev/null; then \

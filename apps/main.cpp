@@ -1,10 +1,10 @@
-#include "apps/commands.hpp"
-#include "apps/version.hpp"
-#include "fem/blas_threads.hpp"
-#include "fem/check.hpp"
-#include "fem/heap.hpp"
-#include "reduction/basis.hpp"
-#include "reduction/exports.hpp"
+#include "apps/base/version.hpp"
+#include "apps/commands/commands.hpp"
+#include "fem/base/blas_threads.hpp"
+#include "fem/base/check.hpp"
+#include "fem/base/heap.hpp"
+#include "reduction/basis/basis.hpp"
+#include "reduction/exports/exports.hpp"
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

@@ -2,8 +2,8 @@
 
 // SPORT as benchmarks fly it.
 
-#include "apps/simulate.hpp"
-#include "apps/tree_flight.hpp"
+#include "apps/simulate/simulate.hpp"
+#include "apps/simulate/tree_flight.hpp"
 
 #include <Eigen/Core>
 

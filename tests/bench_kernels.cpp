@@ -1,8 +1,8 @@
 // What is computed here beside the library that could do it: orders of elimination beside those of CHOLMOD, small
 // products beside those of Eigen.
 
-#include "dynamics/small_product.hpp"
-#include "fem/ordering.hpp"
+#include "dynamics/numerics/small_product.hpp"
+#include "fem/linear_algebra/ordering.hpp"
 
 #include <benchmark/benchmark.h>
 #include <cholmod.h>

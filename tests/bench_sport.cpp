@@ -2,8 +2,8 @@
 // against differences, and whole runs with the error they reach. Every figure stands beside one that was timed in the
 // same run.
 
-#include "dynamics/ode.hpp"
-#include "dynamics/rotation.hpp"
+#include "dynamics/methods/ode.hpp"
+#include "dynamics/numerics/rotation.hpp"
 
 #include "tests/bench_hub.hpp"
 

@@ -1,9 +1,9 @@
 // Speed of trees: chains of flexible links by their length, bodies by their modes, stars by their booms.
 
-#include "dynamics/hub_with_booms.hpp"
-#include "dynamics/tree_integrator.hpp"
+#include "dynamics/model/hub_with_booms.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
 
-#include "reduction/eq14.hpp"
+#include "reduction/invariants/eq14.hpp"
 #include "tests/bench_hub.hpp"
 
 #include <benchmark/benchmark.h>

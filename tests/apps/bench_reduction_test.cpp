@@ -1,4 +1,4 @@
-#include "apps/bench_reduction.hpp"
+#include "apps/bench/reduction.hpp"
 
 #include <gtest/gtest.h>
 

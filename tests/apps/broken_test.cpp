@@ -1,8 +1,8 @@
 // Every file in broken/ has something wrong. broken/expected.txt says what must be reported: one line per fault,
 // "file:line: words of the message"; the report must have these faults and no others.
 
-#include "apps/scene.hpp"
-#include "fem/check.hpp"
+#include "apps/scene/scene.hpp"
+#include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>
 

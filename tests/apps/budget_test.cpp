@@ -1,8 +1,8 @@
 // What the error budget says, and what it must not say; warnings of what a theory cannot hold.
 
-#include "apps/commands.hpp"
-#include "apps/results.hpp"
-#include "reduction/body_file.hpp"
+#include "apps/commands/commands.hpp"
+#include "apps/results/results.hpp"
+#include "reduction/body_file/body_file.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
 

@@ -1,8 +1,8 @@
 // Scenes whose joints have laws: keys, runs in both formulations, with everything else that a scene may have.
 
-#include "apps/results.hpp"
-#include "apps/scene.hpp"
-#include "apps/scene_law.hpp"
+#include "apps/results/results.hpp"
+#include "apps/scene/scene.hpp"
+#include "apps/scene/scene_law.hpp"
 #include "run_testing.hpp"
 
 #include <fmt/format.h>

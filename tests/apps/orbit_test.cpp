@@ -1,6 +1,6 @@
-#include "apps/scene.hpp"
-#include "apps/simulate.hpp"
-#include "dynamics/rotation.hpp"
+#include "apps/scene/scene.hpp"
+#include "apps/simulate/simulate.hpp"
+#include "dynamics/numerics/rotation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,8 +2,8 @@
 
 // Runs of scenes, and what is read from them.
 
-#include "apps/simulate.hpp"
-#include "fem/check.hpp"
+#include "apps/simulate/simulate.hpp"
+#include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

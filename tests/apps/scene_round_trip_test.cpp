@@ -1,9 +1,9 @@
-#include "apps/key_tables.hpp"
-#include "apps/scene.hpp"
-#include "apps/scene_keys.hpp"
-#include "apps/toml_reader.hpp"
+#include "apps/base/toml_reader.hpp"
+#include "apps/scene/key_tables.hpp"
+#include "apps/scene/scene.hpp"
+#include "apps/scene/scene_keys.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 #include "scene_testing.hpp"
 
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
-#include "apps/scene.hpp"
+#include "apps/scene/scene.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 #include "scene_testing.hpp"
 
 #include <gtest/gtest.h>

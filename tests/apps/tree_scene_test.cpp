@@ -1,12 +1,12 @@
 // Scenes with joints: what is read, written back and refused.
 
-#include "apps/scene.hpp"
-#include "apps/simulate.hpp"
+#include "apps/scene/scene.hpp"
+#include "apps/simulate/simulate.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
 
-#include "fem/check.hpp"
-#include "reduction/body_file.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/body_file/body_file.hpp"
 
 #include <gtest/gtest.h>
 

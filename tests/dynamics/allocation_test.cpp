@@ -1,5 +1,5 @@
-#include "dynamics/hub_with_booms.hpp"
-#include "dynamics/ode.hpp"
+#include "dynamics/methods/ode.hpp"
+#include "dynamics/model/hub_with_booms.hpp"
 #include "tree_testing.hpp"
 
 #include <gtest/gtest.h>

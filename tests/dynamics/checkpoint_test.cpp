@@ -1,8 +1,8 @@
 // What is told of a flight on its way, and where it fails; and motions that die out before they reach a stop.
 
-#include "dynamics/formulations.hpp"
-#include "dynamics/tree_integrator.hpp"
-#include "fem/check.hpp"
+#include "dynamics/simulation/formulations.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
+#include "fem/base/check.hpp"
 #include "hub_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "dynamics/crossing.hpp"
+#include "dynamics/numerics/crossing.hpp"
 
 #include <gtest/gtest.h>
 

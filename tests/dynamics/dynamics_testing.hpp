@@ -1,8 +1,8 @@
 #pragma once
 
-#include "dynamics/hinge.hpp"
-#include "reduction/eq14.hpp"
-#include "reduction/reduced_body.hpp"
+#include "dynamics/model/hinge.hpp"
+#include "reduction/body/reduced_body.hpp"
+#include "reduction/invariants/eq14.hpp"
 
 #include <Eigen/Core>
 

@@ -1,9 +1,9 @@
-#include "dynamics/collocation.hpp"
-#include "dynamics/linear_part.hpp"
-#include "dynamics/phi.hpp"
-#include "dynamics/tree_integrator.hpp"
+#include "dynamics/numerics/collocation.hpp"
+#include "dynamics/numerics/linear_part.hpp"
+#include "dynamics/numerics/phi.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 #include "hub_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
-#include "dynamics/flight.hpp"
+#include "dynamics/events/flight.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>
 

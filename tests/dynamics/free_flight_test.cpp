@@ -1,9 +1,9 @@
 // One boom in free flight, by clamped modes and by mean axes: two descriptions of one motion.
 
-#include "dynamics/rotation.hpp"
-#include "reduction/inertia_invariants.hpp"
-#include "reduction/mean_axis.hpp"
-#include "reduction/root_loads.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "reduction/basis/mean_axis.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
+#include "reduction/invariants/root_loads.hpp"
 #include "tests/reduction/booms.hpp"
 
 #include <gtest/gtest.h>

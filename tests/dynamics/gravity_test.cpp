@@ -1,8 +1,8 @@
-#include "dynamics/gravity.hpp"
+#include "dynamics/environment/gravity.hpp"
 
-#include "dynamics/rotation.hpp"
+#include "dynamics/numerics/rotation.hpp"
 #include "dynamics_testing.hpp"
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>
 

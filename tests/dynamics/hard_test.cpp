@@ -1,9 +1,9 @@
 // Cases where integrators and contact logic break, each with the outcome that must be seen.
 
-#include "dynamics/rotation.hpp"
-#include "dynamics/tree_integrator.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 #include "hub_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -1,10 +1,10 @@
 #pragma once
 
-#include "dynamics/hub_with_booms.hpp"
-#include "dynamics/rotation.hpp"
-#include "dynamics/tree_integrator.hpp"
+#include "dynamics/model/hub_with_booms.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
 #include "dynamics_testing.hpp"
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 
 #include <algorithm>
 #include <optional>

@@ -1,7 +1,7 @@
 
-#include "dynamics/newton_matrix.hpp"
-#include "dynamics/split.hpp"
-#include "fem/check.hpp"
+#include "dynamics/numerics/newton_matrix.hpp"
+#include "dynamics/relative/split.hpp"
+#include "fem/base/check.hpp"
 #include "hub_testing.hpp"
 
 #include <gtest/gtest.h>

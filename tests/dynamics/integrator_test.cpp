@@ -1,6 +1,6 @@
-#include "dynamics/tree_integrator.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 #include "hub_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -1,10 +1,10 @@
 // Laws of hinges and sliders against closed forms of one freedom, by every method and in both formulations.
 
-#include "dynamics/laws.hpp"
+#include "dynamics/events/laws.hpp"
 
 #include "laws_testing.hpp"
-#include "reduction/eq14.hpp"
-#include "reduction/reduced_body.hpp"
+#include "reduction/body/reduced_body.hpp"
+#include "reduction/invariants/eq14.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "dynamics/formulations.hpp"
-#include "dynamics/multipliers.hpp"
-#include "dynamics/tree_integrator.hpp"
+#include "dynamics/redundant/multipliers.hpp"
+#include "dynamics/simulation/formulations.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
 #include "tree_testing.hpp"
 
 #include <algorithm>

@@ -1,10 +1,10 @@
 // Both formulations refuse the same, in the same words.
 
-#include "dynamics/multibody_check.hpp"
-#include "dynamics/hub_with_booms.hpp"
-#include "dynamics/multipliers.hpp"
-#include "dynamics/tree.hpp"
-#include "fem/check.hpp"
+#include "dynamics/model/multibody_check.hpp"
+#include "dynamics/model/hub_with_booms.hpp"
+#include "dynamics/redundant/multipliers.hpp"
+#include "dynamics/relative/tree.hpp"
+#include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
-#include "dynamics/multipliers.hpp"
-#include "dynamics/rotation.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "dynamics/redundant/multipliers.hpp"
 
 #include "dynamics_testing.hpp"
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 #include "multipliers_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
-#include "dynamics/formulations.hpp"
-#include "dynamics/multipliers_equations.hpp"
-#include "dynamics/multipliers_start.hpp"
-#include "dynamics/rotation.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "dynamics/redundant/equations.hpp"
+#include "dynamics/redundant/start.hpp"
+#include "dynamics/simulation/formulations.hpp"
 
 #include "dynamics_testing.hpp"
 #include "multipliers_testing.hpp"
-#include "reduction/tilde.hpp"
+#include "reduction/body/tilde.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/LU>

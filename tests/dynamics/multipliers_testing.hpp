@@ -1,6 +1,6 @@
 #pragma once
 
-#include "dynamics/multipliers.hpp"
+#include "dynamics/redundant/multipliers.hpp"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

@@ -1,7 +1,7 @@
-#include "dynamics/orbit.hpp"
+#include "dynamics/environment/orbit.hpp"
 
-#include "dynamics/rotation.hpp"
-#include "fem/check.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,10 +1,10 @@
 // Flights in the field of a planet: attitude against independent solutions, and no digits lost to its distance.
 
-#include "dynamics/formulations.hpp"
-#include "dynamics/multipliers.hpp"
-#include "dynamics/rotation.hpp"
-#include "dynamics/tree_integrator.hpp"
-#include "fem/check.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "dynamics/redundant/multipliers.hpp"
+#include "dynamics/simulation/formulations.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
+#include "fem/base/check.hpp"
 #include "hub_testing.hpp"
 #include "sport_testing.hpp"
 

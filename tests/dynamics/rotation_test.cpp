@@ -1,6 +1,6 @@
-#include "dynamics/rotation.hpp"
+#include "dynamics/numerics/rotation.hpp"
 
-#include "dynamics/dual.hpp"
+#include "dynamics/numerics/dual.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,13 @@
 // The second-order displacements of geometric stiffness: a kinetic energy that is a square, whatever the deflection.
 
-#include "dynamics/second_order_shapes.hpp"
+#include "dynamics/model/second_order_shapes.hpp"
 
-#include "dynamics/multipliers.hpp"
-#include "dynamics/tree.hpp"
-#include "fem/boom.hpp"
-#include "fem/check.hpp"
-#include "reduction/geometric_stiffness.hpp"
-#include "reduction/inertia_invariants.hpp"
+#include "dynamics/redundant/multipliers.hpp"
+#include "dynamics/relative/tree.hpp"
+#include "fem/base/check.hpp"
+#include "fem/booms/boom.hpp"
+#include "reduction/invariants/geometric_stiffness.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tree_testing.hpp"
 
 #include <gtest/gtest.h>

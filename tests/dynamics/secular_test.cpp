@@ -1,6 +1,6 @@
-#include "dynamics/secular.hpp"
+#include "dynamics/numerics/secular.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>

@@ -1,4 +1,4 @@
-#include "dynamics/small_product.hpp"
+#include "dynamics/numerics/small_product.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "dynamics/hub_with_booms.hpp"
+#include "dynamics/model/hub_with_booms.hpp"
 #include "dynamics_testing.hpp"
 
 #include <vector>

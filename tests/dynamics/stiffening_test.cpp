@@ -1,11 +1,11 @@
 // Geometric stiffness in the equations of trees.
 
-#include "dynamics/tree_integrator.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
 
-#include "dynamics/rotation.hpp"
-#include "dynamics/second_order_shapes.hpp"
-#include "fem/check.hpp"
-#include "reduction/geometric_stiffness.hpp"
+#include "dynamics/model/second_order_shapes.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/invariants/geometric_stiffness.hpp"
 #include "tree_oracle.hpp"
 #include "tree_testing.hpp"
 

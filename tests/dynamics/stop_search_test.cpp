@@ -1,4 +1,4 @@
-#include "dynamics/stop_search.hpp"
+#include "dynamics/methods/stop_search.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/LU>

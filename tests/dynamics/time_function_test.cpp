@@ -1,7 +1,7 @@
-#include "dynamics/time_function.hpp"
+#include "dynamics/model/time_function.hpp"
 
-#include "dynamics/expression.hpp"
-#include "fem/check.hpp"
+#include "dynamics/numerics/expression.hpp"
+#include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>
 

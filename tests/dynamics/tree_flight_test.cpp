@@ -1,9 +1,9 @@
 // Trees in motion: conservation, closed forms, the stop.
 
-#include "dynamics/tree_integrator.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
 
-#include "dynamics/rotation.hpp"
-#include "fem/check.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "fem/base/check.hpp"
 #include "tree_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -3,7 +3,7 @@
 // Virtual power over point masses for any tree: kinematics in Taylor arithmetic in time, no invariants, no angular
 // velocities of places, no recursion of inertia.
 
-#include "dynamics/tree.hpp"
+#include "dynamics/relative/tree.hpp"
 #include "dynamics_testing.hpp"
 
 #include <Eigen/LU>

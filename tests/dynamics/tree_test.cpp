@@ -1,7 +1,7 @@
-#include "dynamics/tree.hpp"
+#include "dynamics/relative/tree.hpp"
 
-#include "dynamics/rotation.hpp"
-#include "fem/check.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "fem/base/check.hpp"
 #include "tree_oracle.hpp"
 #include "tree_testing.hpp"
 

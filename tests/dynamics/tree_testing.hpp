@@ -1,6 +1,6 @@
 #pragma once
 
-#include "dynamics/tree.hpp"
+#include "dynamics/relative/tree.hpp"
 #include "dynamics_testing.hpp"
 
 #include <Eigen/Geometry>

@@ -1,8 +1,8 @@
-#include "fem/read_abaqus.hpp"
+#include "fem/formats/abaqus/read.hpp"
 
 #include "deck_testing.hpp"
-#include "fem/files.hpp"
-#include "fem/mesh_sets.hpp"
+#include "fem/base/files.hpp"
+#include "fem/mesh/mesh_sets.hpp"
 
 #include <fmt/format.h>
 

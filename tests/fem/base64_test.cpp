@@ -1,4 +1,4 @@
-#include "fem/base64.hpp"
+#include "fem/base/base64.hpp"
 
 #include "fem_testing.hpp"
 

@@ -1,4 +1,4 @@
-#include "fem/constraints.hpp"
+#include "fem/assembly/constraints.hpp"
 
 #include "fem_testing.hpp"
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "fem/assembly.hpp"
-#include "fem/constraints.hpp"
+#include "fem/assembly/assembly.hpp"
+#include "fem/assembly/constraints.hpp"
 #include "mesh_file_testing.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
-#include "fem/dense.hpp"
+#include "fem/linear_algebra/dense.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "fem/assembly.hpp"
-#include "fem/boom.hpp"
-#include "fem/element.hpp"
+#include "fem/assembly/assembly.hpp"
+#include "fem/booms/boom.hpp"
+#include "fem/mesh/element.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

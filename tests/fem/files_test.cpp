@@ -1,6 +1,6 @@
-#include "fem/files.hpp"
+#include "fem/base/files.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,7 +1,7 @@
-#include "fem/gmsh_script.hpp"
+#include "fem/formats/gmsh/script.hpp"
 
-#include "fem/check.hpp"
-#include "fem/files.hpp"
+#include "fem/base/check.hpp"
+#include "fem/base/files.hpp"
 #include "mesh_file_testing.hpp"
 
 #include <map>

@@ -1,7 +1,7 @@
-#include "fem/gmsh.hpp"
+#include "fem/formats/gmsh/gmsh.hpp"
 
-#include "fem/files.hpp"
-#include "fem/node_orders.hpp"
+#include "fem/base/files.hpp"
+#include "fem/formats/common/node_orders.hpp"
 #include "mesh_file_testing.hpp"
 
 #include <cstring>

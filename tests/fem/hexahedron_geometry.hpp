@@ -1,8 +1,8 @@
 #pragma once
 
-#include "fem/element.hpp"
-#include "fem/section_grid.hpp"
-#include "fem/shape_functions.hpp"
+#include "fem/mesh/element.hpp"
+#include "fem/mesh/section_grid.hpp"
+#include "fem/mesh/shape_functions.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>

@@ -1,7 +1,7 @@
-#include "fem/inertia.hpp"
+#include "fem/linear_algebra/inertia.hpp"
 
-#include "fem/blas_threads.hpp"
-#include "fem/check.hpp"
+#include "fem/base/blas_threads.hpp"
+#include "fem/base/check.hpp"
 
 #include "box_matrix.hpp"
 

@@ -1,8 +1,8 @@
-#include "fem/mesh_file.hpp"
+#include "fem/formats/mesh_formats.hpp"
 
-#include "fem/files.hpp"
-#include "fem/text_reader.hpp"
-#include "fem/write_abaqus.hpp"
+#include "fem/base/files.hpp"
+#include "fem/base/text_reader.hpp"
+#include "fem/formats/abaqus/write.hpp"
 #include "mesh_file_testing.hpp"
 
 #include <sys/stat.h>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "fem/mesh_file.hpp"
+#include "fem/formats/mesh_formats.hpp"
 #include "fem_testing.hpp"
 #include "solid_testing.hpp"
 

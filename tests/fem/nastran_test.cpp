@@ -1,7 +1,7 @@
-#include "fem/read_nastran.hpp"
+#include "fem/formats/nastran/read.hpp"
 
 #include "deck_testing.hpp"
-#include "fem/files.hpp"
+#include "fem/base/files.hpp"
 
 #include <fmt/format.h>
 

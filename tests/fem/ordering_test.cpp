@@ -1,6 +1,6 @@
-#include "fem/ordering.hpp"
+#include "fem/linear_algebra/ordering.hpp"
 
-#include "fem/quotient_graph.hpp"
+#include "fem/linear_algebra/quotient_graph.hpp"
 
 #include "box_matrix.hpp"
 

@@ -1,4 +1,4 @@
-#include "fem/process.hpp"
+#include "fem/base/process.hpp"
 
 #include "mesh_file_testing.hpp"
 

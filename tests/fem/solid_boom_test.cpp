@@ -1,7 +1,7 @@
-#include "fem/solid_boom.hpp"
-#include "fem/shape_functions.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "fem/mesh/shape_functions.hpp"
 
-#include "fem/boom_plan.hpp"
+#include "fem/booms/boom_plan.hpp"
 #include "fem_testing.hpp"
 #include "hexahedron_geometry.hpp"
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "fem/shape_functions.hpp"
+#include "fem/mesh/shape_functions.hpp"
 #include "fem_testing.hpp"
 
 #include <Eigen/SparseCholesky>

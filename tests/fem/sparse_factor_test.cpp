@@ -1,7 +1,7 @@
-#include "fem/sparse_factor.hpp"
+#include "fem/linear_algebra/sparse_factor.hpp"
 
-#include "fem/check.hpp"
-#include "fem/constraints.hpp"
+#include "fem/assembly/constraints.hpp"
+#include "fem/base/check.hpp"
 
 #include "fem_testing.hpp"
 

@@ -1,4 +1,4 @@
-#include "fem/sparse.hpp"
+#include "fem/linear_algebra/sparse.hpp"
 
 #include "fem_testing.hpp"
 

@@ -1,6 +1,6 @@
-#include "fem/supernodal_solve.hpp"
+#include "fem/linear_algebra/supernodal_solve.hpp"
 
-#include "fem/sparse_factor.hpp"
+#include "fem/linear_algebra/sparse_factor.hpp"
 
 #include "box_matrix.hpp"
 

@@ -1,7 +1,7 @@
-#include "fem/text_reader.hpp"
-#include "fem/files.hpp"
+#include "fem/base/text_reader.hpp"
+#include "fem/base/files.hpp"
 
-#include "fem/label_index.hpp"
+#include "fem/base/label_index.hpp"
 #include "fem_testing.hpp"
 
 #include <fmt/format.h>

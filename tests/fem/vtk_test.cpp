@@ -1,6 +1,6 @@
-#include "fem/vtk.hpp"
+#include "fem/formats/vtk/vtk.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 #include "fem_testing.hpp"
 
 #include <unistd.h>

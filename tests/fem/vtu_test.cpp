@@ -1,6 +1,6 @@
-#include "fem/files.hpp"
-#include "fem/text_reader.hpp"
-#include "fem/vtk.hpp"
+#include "fem/base/files.hpp"
+#include "fem/base/text_reader.hpp"
+#include "fem/formats/vtk/vtk.hpp"
 #include "mesh_file_testing.hpp"
 
 #include <fmt/format.h>

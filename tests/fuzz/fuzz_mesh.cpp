@@ -1,10 +1,10 @@
 // Any bytes must be a mesh or an InputError. One program per reader: FLEXBOOM_FUZZ_READER is its name.
 
-#include "fem/check.hpp"
-#include "fem/gmsh.hpp"
-#include "fem/read_abaqus.hpp"
-#include "fem/read_nastran.hpp"
-#include "fem/vtk.hpp"
+#include "fem/base/check.hpp"
+#include "fem/formats/abaqus/read.hpp"
+#include "fem/formats/gmsh/gmsh.hpp"
+#include "fem/formats/nastran/read.hpp"
+#include "fem/formats/vtk/vtk.hpp"
 
 #include <cstddef>
 #include <cstdint>

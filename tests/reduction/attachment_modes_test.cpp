@@ -1,9 +1,9 @@
-#include "reduction/attachment_modes.hpp"
+#include "reduction/basis/attachment_modes.hpp"
 
-#include "fem/check.hpp"
-#include "fem/solid_boom.hpp"
-#include "reduction/inertia_invariants.hpp"
-#include "reduction/mean_axis.hpp"
+#include "fem/base/check.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/basis/mean_axis.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 #include "tests/reduction/compliance.hpp"
 

@@ -1,10 +1,10 @@
-#include "reduction/body_file.hpp"
+#include "reduction/body_file/body_file.hpp"
 
-#include "fem/check.hpp"
-#include "reduction/eq14.hpp"
-#include "reduction/inertia_invariants.hpp"
-#include "reduction/modal_basis.hpp"
-#include "reduction/sha256.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/basis/modal_basis.hpp"
+#include "reduction/body_file/sha256.hpp"
+#include "reduction/invariants/eq14.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "fem/assembly.hpp"
-#include "fem/boom.hpp"
+#include "fem/assembly/assembly.hpp"
+#include "fem/booms/boom.hpp"
 
 namespace flexboom::test {
 

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "fem/assembly.hpp"
-#include "fem/constraints.hpp"
-#include "reduction/reduced_matrices.hpp"
-#include "reduction/static_shapes.hpp"
+#include "fem/assembly/assembly.hpp"
+#include "fem/assembly/constraints.hpp"
+#include "reduction/basis/reduced_matrices.hpp"
+#include "reduction/basis/static_shapes.hpp"
 
 namespace flexboom::test {
 

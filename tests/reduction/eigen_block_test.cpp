@@ -1,5 +1,5 @@
-#include "reduction/eigen_basis.hpp"
-#include "reduction/eigen_shift.hpp"
+#include "reduction/eigen/orthogonal_basis.hpp"
+#include "reduction/eigen/shift.hpp"
 
 #include "tests/reduction/eigen_testing.hpp"
 

@@ -1,4 +1,4 @@
-#include "reduction/eigen_solver.hpp"
+#include "reduction/eigen/solver.hpp"
 
 #include "tests/reduction/eigen_testing.hpp"
 

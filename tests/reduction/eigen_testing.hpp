@@ -1,7 +1,7 @@
 #pragma once
 
-#include "fem/check.hpp"
-#include "reduction/eigen_backends.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/eigen/backends.hpp"
 #include "tests/reduction/messages.hpp"
 
 #include <algorithm>

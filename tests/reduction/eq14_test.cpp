@@ -1,7 +1,7 @@
-#include "reduction/eq14.hpp"
-#include "reduction/tilde.hpp"
+#include "reduction/invariants/eq14.hpp"
+#include "reduction/body/tilde.hpp"
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 #include "tests/reduction/csv.hpp"
 
 #include <gtest/gtest.h>

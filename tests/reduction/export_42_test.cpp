@@ -1,5 +1,5 @@
-#include "reduction/export_42.hpp"
-#include "fem/files.hpp"
+#include "fem/base/files.hpp"
+#include "reduction/exports/nasa42.hpp"
 #include "tests/reduction/export_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
-#include "reduction/export_exudyn.hpp"
+#include "reduction/exports/exudyn.hpp"
 
-#include "fem/files.hpp"
-#include "reduction/exudyn_dictionary.hpp"
+#include "fem/base/files.hpp"
+#include "reduction/exports/exudyn_dictionary.hpp"
 #include "tests/reduction/skew_body.hpp"
 
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
 // What each target program computes from its file, by its own formulas, against the sum over the mass points of a body
 // in arbitrary motion: index orders and signs that writer and reader share are found here.
-#include "reduction/export_42.hpp"
-#include "reduction/export_coupling.hpp"
-#include "reduction/export_integrals.hpp"
-#include "reduction/export_mbdyn.hpp"
-#include "reduction/export_sid.hpp"
-#include "reduction/tilde.hpp"
+#include "reduction/body/tilde.hpp"
+#include "reduction/exports/coupling.hpp"
+#include "reduction/exports/integrals.hpp"
+#include "reduction/exports/mbdyn.hpp"
+#include "reduction/exports/nasa42.hpp"
+#include "reduction/exports/sid.hpp"
 #include "tests/reduction/export_testing.hpp"
 
 #include <gtest/gtest.h>

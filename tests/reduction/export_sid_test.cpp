@@ -1,7 +1,7 @@
-#include "reduction/export_sid.hpp"
-#include "fem/files.hpp"
-#include "fem/text_reader.hpp"
-#include "reduction/export_integrals.hpp"
+#include "fem/base/files.hpp"
+#include "fem/base/text_reader.hpp"
+#include "reduction/exports/integrals.hpp"
+#include "reduction/exports/sid.hpp"
 #include "tests/reduction/export_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "reduction/export_simscape.hpp"
+#include "reduction/exports/simscape.hpp"
 
 #include "tests/reduction/skew_body.hpp"
 

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "fem/assembly.hpp"
-#include "fem/element.hpp"
-#include "reduction/inertia_invariants.hpp"
+#include "fem/assembly/assembly.hpp"
+#include "fem/mesh/element.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/messages.hpp"
 
 #include <gtest/gtest.h>

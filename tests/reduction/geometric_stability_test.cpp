@@ -1,7 +1,7 @@
-#include "fem/solid_boom.hpp"
-#include "reduction/geometric_stiffness.hpp"
-#include "reduction/inertia_invariants.hpp"
-#include "reduction/modal_basis.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/basis/modal_basis.hpp"
+#include "reduction/invariants/geometric_stiffness.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/csv.hpp"
 #include "tests/reduction/geometric_stiffness_testing.hpp"
 

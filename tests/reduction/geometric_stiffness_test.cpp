@@ -1,12 +1,12 @@
-#include "reduction/geometric_stiffness.hpp"
+#include "reduction/invariants/geometric_stiffness.hpp"
 
-#include "fem/check.hpp"
-#include "fem/solid_boom.hpp"
-#include "fem/sparse_factor.hpp"
-#include "reduction/geometric_stiffness_loads.hpp"
-#include "reduction/inertia_invariants.hpp"
-#include "reduction/modal_basis.hpp"
-#include "reduction/reduced_matrices.hpp"
+#include "fem/base/check.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "fem/linear_algebra/sparse_factor.hpp"
+#include "reduction/basis/modal_basis.hpp"
+#include "reduction/basis/reduced_matrices.hpp"
+#include "reduction/body/geometric_stiffness_loads.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/geometric_stiffness_testing.hpp"
 
 #include <gtest/gtest.h>

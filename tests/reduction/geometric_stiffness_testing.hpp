@@ -1,7 +1,7 @@
 #pragma once
 
-#include "fem/solid_boom.hpp"
-#include "reduction/geometric_stiffness.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/invariants/geometric_stiffness.hpp"
 #include "tests/fem/solid_testing.hpp"
 
 #include <string>

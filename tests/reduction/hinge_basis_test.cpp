@@ -1,10 +1,10 @@
-#include "reduction/hinge_basis.hpp"
+#include "reduction/basis/hinge_basis.hpp"
 
-#include "fem/check.hpp"
-#include "fem/solid_boom.hpp"
-#include "reduction/certificate.hpp"
-#include "reduction/eq14.hpp"
-#include "reduction/inertia_invariants.hpp"
+#include "fem/base/check.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/invariants/certificate.hpp"
+#include "reduction/invariants/eq14.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 
 #include <fmt/format.h>

@@ -1,8 +1,8 @@
-#include "reduction/inertia_invariants.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 
-#include "fem/check.hpp"
-#include "reduction/certificate.hpp"
-#include "reduction/eq14.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/invariants/certificate.hpp"
+#include "reduction/invariants/eq14.hpp"
 #include "tests/reduction/booms.hpp"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
-#include "reduction/lumped_invariants.hpp"
+#include "reduction/invariants/lumped_invariants.hpp"
 
-#include "fem/check.hpp"
-#include "reduction/inertia_invariants.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/fem/solid_testing.hpp"
 #include "tests/reduction/booms.hpp"
 

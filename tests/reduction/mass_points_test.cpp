@@ -1,7 +1,7 @@
-#include "reduction/mass_points.hpp"
+#include "reduction/body/mass_points.hpp"
 
-#include "fem/check.hpp"
-#include "reduction/eq14.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/invariants/eq14.hpp"
 #include "tests/reduction/export_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
-#include "reduction/mean_axis.hpp"
+#include "reduction/basis/mean_axis.hpp"
 
-#include "fem/check.hpp"
-#include "fem/solid_boom.hpp"
-#include "reduction/inertia_invariants.hpp"
+#include "fem/base/check.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 
 #include <gtest/gtest.h>

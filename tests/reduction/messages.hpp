@@ -1,6 +1,6 @@
 #pragma once
 
-#include "fem/check.hpp"
+#include "fem/base/check.hpp"
 
 #include <functional>
 #include <string>

@@ -1,9 +1,9 @@
-#include "reduction/modal_basis.hpp"
-#include "fem/solid_boom.hpp"
-#include "reduction/inertia_invariants.hpp"
+#include "reduction/basis/modal_basis.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 
-#include "fem/check.hpp"
-#include "reduction/eq14.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/invariants/eq14.hpp"
 #include "tests/reduction/booms.hpp"
 #include "tests/reduction/csv.hpp"
 

@@ -1,9 +1,9 @@
-#include "reduction/mode_alignment.hpp"
+#include "reduction/basis/mode_alignment.hpp"
 
-#include "fem/solid_boom.hpp"
-#include "reduction/craig_bampton.hpp"
-#include "reduction/inertia_invariants.hpp"
-#include "reduction/mean_axis.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/basis/craig_bampton.hpp"
+#include "reduction/basis/mean_axis.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 
 #include <gtest/gtest.h>

@@ -1,9 +1,9 @@
-#include "reduction/mode_selection.hpp"
+#include "reduction/basis/mode_selection.hpp"
 
-#include "fem/check.hpp"
-#include "reduction/eq14.hpp"
-#include "reduction/geometric_stiffness.hpp"
-#include "reduction/inertia_invariants.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/invariants/eq14.hpp"
+#include "reduction/invariants/geometric_stiffness.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 #include "tests/reduction/csv.hpp"
 

@@ -1,7 +1,7 @@
-#include "reduction/reduced_body.hpp"
+#include "reduction/body/reduced_body.hpp"
 
-#include "fem/check.hpp"
-#include "reduction/eq14.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/invariants/eq14.hpp"
 #include "tests/reduction/messages.hpp"
 
 #include <gtest/gtest.h>

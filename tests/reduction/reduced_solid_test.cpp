@@ -1,8 +1,8 @@
-#include "fem/solid_boom.hpp"
-#include "reduction/body_shapes.hpp"
-#include "reduction/inertia_invariants.hpp"
-#include "reduction/reduced_matrices.hpp"
-#include "reduction/surface.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/basis/body_shapes.hpp"
+#include "reduction/basis/reduced_matrices.hpp"
+#include "reduction/basis/surface.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/fem/solid_testing.hpp"
 #include "tests/reduction/booms.hpp"
 

@@ -1,6 +1,6 @@
-#include "reduction/root_loads.hpp"
+#include "reduction/invariants/root_loads.hpp"
 
-#include "fem/constraints.hpp"
+#include "fem/assembly/constraints.hpp"
 #include "tests/reduction/export_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "reduction/inertia_invariants.hpp"
-#include "reduction/tilde.hpp"
+#include "reduction/body/tilde.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 #include "tests/reduction/messages.hpp"
 

@@ -1,8 +1,8 @@
-#include "reduction/smooth_shapes.hpp"
+#include "reduction/basis/smooth_shapes.hpp"
 
-#include "fem/constraints.hpp"
-#include "fem/solid_boom.hpp"
-#include "reduction/eigen_solver.hpp"
+#include "fem/assembly/constraints.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/eigen/solver.hpp"
 
 #include <gtest/gtest.h>
 

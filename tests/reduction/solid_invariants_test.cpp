@@ -1,5 +1,5 @@
-#include "fem/solid_boom.hpp"
-#include "reduction/inertia_invariants.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 
 #include <gtest/gtest.h>

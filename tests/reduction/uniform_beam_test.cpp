@@ -1,9 +1,9 @@
-#include "reduction/uniform_beam.hpp"
+#include "reduction/invariants/uniform_beam.hpp"
 
-#include "reduction/certificate.hpp"
-#include "reduction/eq14.hpp"
-#include "reduction/hinge_basis.hpp"
-#include "reduction/inertia_invariants.hpp"
+#include "reduction/basis/hinge_basis.hpp"
+#include "reduction/invariants/certificate.hpp"
+#include "reduction/invariants/eq14.hpp"
+#include "reduction/invariants/inertia_invariants.hpp"
 #include "tests/reduction/booms.hpp"
 
 #include <gtest/gtest.h>

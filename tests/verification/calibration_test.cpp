@@ -1,6 +1,6 @@
 // SPORT turned by its reaction wheels: what the booms do to the pointing of the hub.
 
-#include "dynamics/time_function.hpp"
+#include "dynamics/model/time_function.hpp"
 #include "tests/apps/run_testing.hpp"
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 // Every feature of a scene with every other, by relative coordinates and by multipliers: one motion.
 
-#include "apps/report.hpp"
-#include "apps/results_folder.hpp"
-#include "reduction/body_file.hpp"
+#include "apps/results/report.hpp"
+#include "apps/results/results_folder.hpp"
+#include "reduction/body_file/body_file.hpp"
 #include "tests/apps/run_testing.hpp"
 
 #include <gtest/gtest.h>

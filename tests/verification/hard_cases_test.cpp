@@ -1,6 +1,6 @@
-#include "fem/check.hpp"
-#include "fem/solid_boom.hpp"
-#include "reduction/modal_basis.hpp"
+#include "fem/base/check.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/basis/modal_basis.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
-#include "apps/bench_modes.hpp"
-#include "fem/solid_boom.hpp"
-#include "reduction/modal_basis.hpp"
+#include "apps/bench/modes.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/basis/modal_basis.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "apps/simulate.hpp"
+#include "apps/simulate/simulate.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 // The built-in scenes with joints, each against what is known of it.
 
-#include "apps/tree_flight.hpp"
-#include "dynamics/rotation.hpp"
-#include "fem/check.hpp"
-#include "reduction/mean_axis.hpp"
+#include "apps/simulate/tree_flight.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/basis/mean_axis.hpp"
 #include "tests/apps/run_testing.hpp"
 
 #include <gtest/gtest.h>

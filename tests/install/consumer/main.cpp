@@ -1,10 +1,10 @@
 // Walks through every installed library once: a boom as beams, its modes, its reduced body, and a short flight on a
 // hub.
-#include <dynamics/hub_with_booms.hpp>
-#include <dynamics/tree_integrator.hpp>
-#include <fem/boom.hpp>
-#include <reduction/eq14.hpp>
-#include <reduction/inertia_invariants.hpp>
+#include <dynamics/model/hub_with_booms.hpp>
+#include <dynamics/simulation/tree_integrator.hpp>
+#include <fem/booms/boom.hpp>
+#include <reduction/invariants/eq14.hpp>
+#include <reduction/invariants/inertia_invariants.hpp>
 
 #include <cmath>
 #include <iostream>

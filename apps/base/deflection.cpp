@@ -1,0 +1,87 @@
+#include "apps/base/deflection.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <string_view>
+#include <vector>
+
+namespace flexboom {
+
+using Eigen::Index;
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double zero_shape = 1e-10;  // of shapes where the body is held
+
+bool says_tip(std::string_view name) {
+  constexpr std::string_view tip = "tip";
+  return std::ranges::equal(name, tip, {}, [](unsigned char c) { return std::tolower(c); });
+}
+
+/// Of a body without a picture: a rod of its mass and inertia.
+double length_of_rod(const ReducedBody& b) {
+  const double J = b.J0.trace() - 2 * b.mc0.squaredNorm() / b.m;  // about the mass centre
+  return std::sqrt(6 * std::max(J, 0.0) / b.m);
+}
+
+}  // namespace
+
+const Marker* tip_of(const ReducedBody& body) {
+  const Marker *named = nullptr, *only = nullptr;
+  double most = 0;
+  for (const Marker& m : body.markers) {
+    if (says_tip(m.name) && (!named || m.name == "tip")) named = &m;
+    most = std::max(most, m.S.norm());
+  }
+  int moving = 0;
+  for (const Marker& m : body.markers)
+    if (m.S.norm() > zero_shape * most) only = &m, ++moving;
+  return named || moving != 1 ? named : only;
+}
+
+std::string no_tip(const ReducedBody& body) {
+  std::vector<std::string> names;
+  for (const Marker& m : body.markers) names.push_back(m.name);
+  return fmt::format(
+      "body {} has no marker that is its tip: of {} none is called \"tip\", and more than one or none moves", body.name,
+      names.empty() ? "no markers" : fmt::format("{}", fmt::join(names, ", ")));
+}
+
+Vector3d displacement(const ReducedBody& body, const Marker& at, const VectorXd& q, Stiffening stiffening) {
+  if (q.size() == 0) return Vector3d::Zero();
+  Vector3d u = at.S * q;
+  if (stiffening == Stiffening::off) return u;
+  for (const MarkerStiffness& k : body.Kg.markers)
+    for (size_t i = 0; k.marker == at.name && i < k.force.size(); ++i)
+      u[static_cast<Index>(i)] -= 0.5 * q.dot(k.force[i] * q);
+  return u;
+}
+
+Deflection::Deflection(const ReducedBody& body) {
+  constexpr size_t enough = 200;
+  std::vector<const Matrix3Xd*> shapes;
+  for (const Marker& m : body.markers)
+    if (m.S.cols() == body.n()) shapes.push_back(&m.S);
+  const size_t stride = body.display.S.size() / enough + 1;
+  for (size_t i = 0; i < body.display.S.size(); i += stride) shapes.push_back(&body.display.S[i]);
+  S_.resize(3 * std::ssize(shapes), body.n());
+  for (size_t i = 0; i < shapes.size(); ++i) S_.middleRows<3>(3 * static_cast<Index>(i)) = *shapes[i];
+  const Matrix3Xd& points = body.display.points;
+  if (points.cols() > 1) length_ = (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).norm();
+  if (!(length_ > 0)) length_ = length_of_rod(body);
+}
+
+double Deflection::largest(const VectorXd& q) const {
+  if (S_.size() == 0) return 0;
+  const VectorXd u = S_ * q;
+  return std::sqrt(u.reshaped(3, u.size() / 3).colwise().squaredNorm().maxCoeff());
+}
+
+}  // namespace flexboom

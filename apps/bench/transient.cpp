@@ -1,0 +1,140 @@
+#include "apps/bench/transient.hpp"
+
+#include "apps/simulate/simulate.hpp"
+#include "fem/base/stopwatch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace flexboom {
+namespace {
+
+struct Case {
+  std::string name;
+  Scene scene;
+  std::string reference;  // method
+};
+
+Scene sport(int modes, double duration) {
+  Scene scene = load_scene("sport");
+  scene.duration = duration;
+  for (BodyScene& b : scene.bodies) b.structure = "eq14", b.modes = modes, b.modes_auto = false;
+  return scene;
+}
+
+std::vector<Case> cases(const std::vector<std::string>& scenes) {
+  if (!scenes.empty()) {
+    std::vector<Case> list;
+    for (const std::string& name : scenes) {
+      list.push_back({name, load_scene(name), "bdf"});
+    }
+    return list;
+  }
+  std::vector<Case> list{{"sport", sport(2, 10), "bdf"},
+                         {"sport, 8 modes", sport(8, 2), "bdf"},
+                         {"sport, undamped", sport(2, 0.5), "adams"},
+                         {"sport, tumbling", sport(2, 5), "bdf"}};
+  for (BodyScene& b : list[2].scene.bodies) b.damping = {};
+  for (HingeScene& h : list[2].scene.hinges) h.hinge.mechanism.damping = 0;
+  list[3].scene.start_rate = {0.3, -0.2, 0.5};
+  return list;
+}
+
+constexpr const char* by_multipliers = "ida";
+
+/// Those that fly the scene: of relative coordinates, then that of multipliers, which alone closes loops.
+std::vector<std::string> methods_of(const Scene& scene) {
+  std::vector<std::string> names;
+  if (std::ranges::none_of(scene.joints, &JointScene::closes_loop))
+    for (const IntegratorMethod& m : integrator_methods()) names.emplace_back(m.name);
+  names.emplace_back(by_multipliers);
+  return names;
+}
+
+class TransientLadder {
+ public:
+  TransientLadder(double longest, const std::function<void(const TransientBench&)>& seen)
+      : longest_(longest), seen_(seen) {}
+
+  std::vector<TransientBench> run(const std::vector<std::string>& scenes) {
+    for (const Case& c : cases(scenes)) {
+      references_.clear();
+      for (const std::string& method : methods_of(c.scene)) ladder(c, method);
+    }
+    return std::move(rows_);
+  }
+
+ private:
+  void ladder(const Case& c, const std::string& method) {
+    for (int digits = 2; digits <= 9; ++digits) {
+      TransientBench row = measured(c, method, std::pow(10.0, -digits));
+      rows_.push_back(row);
+      seen_(row);
+      if (2 * row.seconds > longest_ || !row.failure.empty()) return;
+    }
+  }
+
+  static Run fly(const Case& c, const std::string& method, double tolerance) {
+    Scene scene = c.scene;
+    scene.integrator = method;
+    scene.formulation = method == by_multipliers ? "multipliers" : "relative";
+    scene.tolerance = tolerance;
+    return run_once(scene, {});
+  }
+
+  const OutputTable& reference(const Case& c, const std::string& judged) {
+    const std::vector<std::string> methods = methods_of(c.scene);
+    const std::string other = methods.size() > 1 ? IntegratorOptions{}.method : methods.front();
+    const std::string method = methods.size() > 1 && judged != c.reference ? c.reference : other;
+    const auto [place, is_new] = references_.try_emplace(method);
+    if (is_new) place->second = fly(c, method, 1e-11).outputs;
+    return place->second;
+  }
+
+  TransientBench measured(const Case& c, const std::string& method, double tolerance) {
+    TransientBench row;
+    row.scene = c.name;
+    row.method = method;
+    row.tolerance = tolerance;
+    row.simulated = c.scene.duration;
+    try {
+      const OutputTable& exact = reference(c, method);
+      row.seconds = std::numeric_limits<double>::infinity();
+      const Stopwatch all;
+      Run r;
+      for (int run = 0; run < 5 && (run == 0 || all.seconds() < 0.5); ++run) {
+        r = fly(c, method, tolerance);
+        row.seconds = std::min(row.seconds, r.motion.summary.seconds);
+      }
+      row.error = largest(compare_outputs(r.outputs, exact, {}));
+      const std::vector<OutputDifference> hub = compare_outputs(r.outputs, exact, {"hub.rotation"});
+      row.hub_error = hub.empty() ? std::numeric_limits<double>::quiet_NaN() : largest(hub);
+      row.energy = r.motion.summary.energy_balance;
+      row.steps = r.motion.summary.steps;
+      row.evaluations = r.motion.summary.rhs_evaluations;
+      row.events = static_cast<long>(r.motion.events.size());
+    } catch (const NumericalError& e) {
+      row.seconds = 0;
+      row.failure = e.what();
+    }
+    return row;
+  }
+
+  double longest_;
+  const std::function<void(const TransientBench&)>& seen_;
+  std::map<std::string, OutputTable> references_;
+  std::vector<TransientBench> rows_;
+};
+
+}  // namespace
+
+std::vector<TransientBench> bench_transient(const std::vector<std::string>& scenes, double longest,
+                                            const std::function<void(const TransientBench&)>& seen) {
+  return TransientLadder(longest, seen).run(scenes);
+}
+
+}  // namespace flexboom

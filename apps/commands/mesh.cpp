@@ -1,0 +1,32 @@
+#include "apps/commands/commands.hpp"
+#include "fem/formats/mesh_formats.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace flexboom {
+
+using nlohmann::ordered_json;
+
+int mesh_command(const MeshArguments& a, const CommonOptions& common) {
+  const Model model = load_model(a.body, a.options);
+  write_mesh(a.file, model.mesh);
+  const Mesh& mesh = model.mesh;
+  if (common.json) {
+    ordered_json sets;
+    for (const auto& [name, nodes] : mesh.node_sets) sets["node_sets"][name] = nodes.size();
+    for (const auto& [name, elements] : mesh.element_sets) sets["element_sets"][name] = elements.size();
+    const ordered_json j = {{"file", a.file.string()},
+                            {"nodes", mesh.nodes.cols()},
+                            {"elements", mesh.elements.size()},
+                            {"sets", sets},
+                            {"notes", model.notes}};
+    fmt::print("{}\n", j.dump(2));
+  } else if (!common.quiet) {
+    for (const std::string& note : model.notes) print_note("note: " + note);
+    fmt::print("{}: {} nodes, {} elements\n", a.file.string(), mesh.nodes.cols(), mesh.elements.size());
+  }
+  return exit_ok;
+}
+
+}  // namespace flexboom

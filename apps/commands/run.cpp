@@ -1,0 +1,297 @@
+#include "apps/commands/commands.hpp"
+#include "apps/results/report.hpp"
+#include "apps/results/results_folder.hpp"
+#include "dynamics/methods/integrator.hpp"
+#include "fem/base/check.hpp"
+#include "fem/base/files.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <sstream>
+
+namespace flexboom {
+
+namespace {
+
+std::atomic<bool> interrupted{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only touch lock-free atomics");
+
+extern "C" void on_interrupt(int) { interrupted.store(true, std::memory_order_relaxed); }
+
+/// Ctrl-C, a request to end, and a terminal that closes end the integration in order while one of these lives; a second
+/// one kills. Under nohup a closed terminal is still no reason to end.
+class InterruptGuard {
+ public:
+  InterruptGuard() {
+    struct sigaction action = {};
+    action.sa_handler = on_interrupt;
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    for (size_t i = 0; i < signals.size(); ++i) {
+      sigaction(signals[i], &action, &before_[i]);
+      if (signals[i] == SIGHUP && before_[i].sa_handler == SIG_IGN) sigaction(SIGHUP, &before_[i], nullptr);
+    }
+  }
+  ~InterruptGuard() {
+    for (size_t i = 0; i < signals.size(); ++i) sigaction(signals[i], &before_[i], nullptr);
+  }
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+
+ private:
+  static constexpr std::array signals = {SIGINT, SIGTERM, SIGHUP};
+  std::array<struct sigaction, signals.size()> before_ = {};
+};
+
+/// One line on a terminal: percent, simulated / wall time, time left. Silent for work under a second and where stderr
+/// is no terminal.
+class ProgressLine {
+ public:
+  explicit ProgressLine(bool wanted) : wanted_(wanted && isatty(STDERR_FILENO) == 1) {}
+  ~ProgressLine() {
+    if (shown_) std::fputs(fmt::format("\r{:79}\r", "").c_str(), stderr);
+  }
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  void operator()(double time, double duration) {
+    if (!wanted_) return;
+    const auto now = std::chrono::steady_clock::now();
+    const double wall = std::chrono::duration<double>(now - start_).count();
+    if (wall < 1 || now - last_ < std::chrono::milliseconds(200)) return;
+    last_ = now;
+    shown_ = true;
+    const std::string line =
+        fmt::format("{:.0f} %  {:.3g} of {:.3g} s simulated in {:.1f} s, {:.3g} s left", 100 * time / duration, time,
+                    duration, wall, wall * (duration - time) / std::max(time, 1e-12));
+    std::fputs(fmt::format("\r{:79}", line).c_str(), stderr);
+    std::fflush(stderr);
+  }
+
+ private:
+  bool wanted_, shown_ = false;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_ = start_;
+};
+
+void override_modes(Scene& scene, const std::string& text) {
+  int n = 0;
+  if (text != "auto") {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), n);
+    require(error == std::errc() && end == text.data() + text.size() && n >= 0,
+            fmt::format("--modes: '{}' is neither a number of modes nor auto", text));
+  }
+  require(std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyScene& b) { return b.is_boom(); }),
+          "--modes: this scene has no boom made from its geometry");
+  for (BodyScene& b : scene.bodies) {
+    if (!b.is_boom()) continue;
+    b.modes_auto = text == "auto";
+    if (!b.modes_auto) b.modes = n;
+  }
+}
+
+/// Did the run of this folder end, killed or failed, before it had a first state?
+bool never_flew(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "summary.json";
+  if (!std::filesystem::exists(file) || std::filesystem::exists(folder / "state.toml")) return false;
+  const nlohmann::json document = nlohmann::json::parse(file_bytes(file), nullptr, false);
+  if (!document.is_object() || !document.contains("status")) return false;
+  return document["status"] == "running" || document["status"] == "failed";
+}
+
+/// The scene begins with a saved state, whose numbers of modes replace those of the scene unless they are asked for.
+void go_on(Scene& scene, const RunArguments& a) {
+  const std::filesystem::path& from = a.from;
+  if (never_flew(from))
+    return print_note(
+        fmt::format("--continue: the run in {} ended before its motion began; this one begins at 0 s", from.string()));
+  auto saved = std::make_shared<const SavedState>(SavedState::read(from, a.force));
+  require(saved->time() < scene.duration,
+          fmt::format("--continue: {} is of t = {:g} s, the run ends at {:g} s; --duration is the time at the end",
+                      saved->file().string(), saved->time(), scene.duration));
+  for (BodyScene& b : scene.bodies) {
+    const auto modes = saved->modes().find(b.name);
+    if ((!std::exchange(b.modes_auto, false) && a.modes.has_value()) || !b.is_elastic() ||
+        modes == saved->modes().end())
+      continue;
+    b.modes = modes->second;
+  }
+  scene.from = std::move(saved);
+}
+
+Scene scene_of(const RunArguments& a) {
+  Scene scene = load_scene(a.scene);
+  const std::filesystem::path file = a.scene;
+  scene.bodies_kept_in = builtin_scene(a.scene) != nullptr ? std::filesystem::path("results") / "bodies"
+                                                           : file.parent_path() / (file.stem().string() + "-bodies");
+  if (a.duration) scene.duration = *a.duration;
+  if (a.tolerance) scene.tolerance = *a.tolerance;
+  if (a.output_step) scene.output_step = *a.output_step;
+  if (a.vtu_step) scene.vtu_step = *a.vtu_step;
+  if (a.integrator) scene.integrator = *a.integrator;
+  if (a.formulation) scene.formulation = *a.formulation;
+  if (a.modes) override_modes(scene, *a.modes);
+  if (a.structure)
+    for (BodyScene& b : scene.bodies)
+      if (b.is_boom()) b.structure = *a.structure;
+  if (a.no_budget) scene.error_budget = false;
+  if (a.loads) {
+    for (HingeScene& h : scene.hinges) h.loads = true;
+    for (JointScene& j : scene.joints) j.loads = j.kind != JointKind::free;
+  }
+  if (!a.from.empty()) go_on(scene, a);
+  validate(scene);
+  return scene;
+}
+
+std::string measured(double value) { return std::isnan(value) ? "not measured" : fmt::format("{:.1e}", value); }
+
+std::string balances(const IntegrationSummary& s) {
+  return fmt::format("energy balance {}, momentum drift {}", measured(s.energy_balance), measured(s.momentum_drift));
+}
+
+void print_summary(const RunResult& r, const std::filesystem::path& folder) {
+  const IntegrationSummary& s = r.trajectory.summary;
+  const double simulated = r.trajectory.time.back() - r.trajectory.time.front();
+  for (const std::string& line : r.plan) fmt::print("{}\n", line);
+  fmt::print("\n{:g} s in {:.3f} s ({:.0f} times real time): {} steps, {} evaluations, {} events\n", simulated,
+             r.integrate_seconds, simulated / std::max(r.integrate_seconds, 1e-9), s.steps, s.rhs_evaluations,
+             r.trajectory.events.size());
+  fmt::print("{} (relative)\n", balances(s));
+  if (r.budget.measured)
+    fmt::print("errors of the outputs: discretisation {}, truncation {}, time {}, linearisation {}; total {}\n",
+               measured(r.budget.discretisation), measured(r.budget.truncation), measured(r.budget.time),
+               measured(r.budget.linearisation), measured(r.budget.total()));
+  fmt::print("results: {}\n", folder.string());
+}
+
+/// The line is gone again before anything else is printed.
+RunResult run_with_progress(const Scene& scene, bool wanted, double checkpoint_every, ResultsFolder& results) {
+  ProgressLine progress(wanted);
+  return run_scene(scene, {&interrupted, [&progress](double t, double T) { progress(t, T); }, checkpoint_every},
+                   [&results](const RunResult& so_far, size_t first) { results.add(so_far, first); });
+}
+
+void write_report(const std::filesystem::path& folder) {
+  write_file(folder / "report.html", report_html(folder));
+  write_file(folder / "overview.svg", overview_svg(folder));
+}
+
+/// Of a run that failed: as much as there is.
+void try_to_report(const std::filesystem::path& folder) {
+  try {
+    write_report(folder);
+  } catch (const std::exception&) {  // it has no rows yet
+  }
+}
+
+/// The run and its files; a run that fails leaves what it came to.
+RunResult run_into(ResultsFolder& results, const Scene& scene, const RunArguments& a, const CommonOptions& common) {
+  try {
+    RunResult r = run_with_progress(scene, !common.quiet && !common.json, a.checkpoint, results);
+    results.write(r);
+    if (a.report) write_report(results.path());
+    return r;
+  } catch (const std::exception& e) {
+    results.fail(e.what());
+    if (a.report) try_to_report(results.path());
+    throw;
+  }
+}
+
+/// Faults of a scene or body as the document of `check --json`; the error itself goes its usual way.
+void print_faults(const std::string& text) {
+  nlohmann::ordered_json faults = nlohmann::ordered_json::array();
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) faults.push_back(line);
+  fmt::print("{}\n", nlohmann::ordered_json{{"ok", false}, {"faults", faults}}.dump(2));
+}
+
+/// What `check` says of a file without faults.
+nlohmann::ordered_json checked(const std::string& name) {
+  if (is_body_file(name))
+    return {{"body", read_body(name).name}, {"warnings", nlohmann::ordered_json::array()}, {"ok", true}};
+  const Scene scene = load_scene(name);
+  validate(scene);
+  const bool certified = std::ranges::all_of(scene.bodies, [](const BodyScene& b) {
+    return !b.reduced || std::ranges::all_of(b.reduced->certificate, &BodyCheck::passed);
+  });
+  return {{"scene", scene.name},           {"bodies", scene.bodies.size()}, {"hinges", scene.hinges.size()},
+          {"joints", scene.joints.size()}, {"warnings", scene.warnings},    {"ok", certified}};
+}
+
+}  // namespace
+
+int run_command(const RunArguments& a, const CommonOptions& common) {
+  const Scene scene = scene_of(a);
+  const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results") / scene.name : common.out;
+  ResultsFolder results(folder, scene, builtin_scene(a.scene) ? "" : a.scene);
+  const InterruptGuard guard;
+  const RunResult result = run_into(results, scene, a, common);
+  const IntegrationSummary& s = result.trajectory.summary;
+  const std::string wrong =
+      is_balanced(s) ? "" : fmt::format("{}: the motion in {} is wrong", balances(s), folder.string());
+  if (!wrong.empty()) results.fail(wrong);
+  if (common.json) {
+    fmt::print("{}\n", results.summary().dump(2));
+  } else if (!common.quiet) {
+    print_summary(result, folder);
+    if (a.report) fmt::print("report: {}\n", (folder / "report.html").string());
+  }
+  if (!common.quiet)
+    for (const std::string& w : result.warnings) print_note("warning: " + w);
+  if (!wrong.empty()) throw NumericalError(wrong);
+  if (!interrupted.load()) return exit_ok;
+  if (!common.quiet)
+    print_note(
+        s.interrupted
+            ? fmt::format("interrupted at t = {:g} s; what was computed is in {}", result.end.time, folder.string())
+            : fmt::format("interrupted after the run, which is whole, in {}; its errors may not have been measured",
+                          folder.string()));
+  return exit_interrupted;
+}
+
+int check_command(const std::string& name, const CommonOptions& common) {
+  try {
+    const nlohmann::ordered_json found = checked(name);
+    if (common.json) {
+      fmt::print("{}\n", found.dump(2));
+    } else if (!common.quiet) {
+      for (const auto& w : found["warnings"]) print_note("warning: " + w.get<std::string>());
+      const bool tree = found.value("joints", 0) > 0;
+      if (found.contains("scene"))
+        fmt::print("{}: {} bodies, {} {}: {}\n", found["scene"].get<std::string>(), found["bodies"].get<int>(),
+                   found[tree ? "joints" : "hinges"].get<int>(), tree ? "joints" : "hinges",
+                   found["ok"].get<bool>() ? "no faults" : "a body fails its own checks");
+      else
+        fmt::print("{}: no faults\n", found["body"].get<std::string>());
+    }
+    if (!found["ok"].get<bool>()) return exit_check_failed;
+  } catch (const InputError& e) {
+    if (common.json) print_faults(e.what());
+    throw;
+  }
+  return exit_ok;
+}
+
+int report_command(const std::filesystem::path& folder, const CommonOptions& common) {
+  const std::filesystem::path file = (common.out.empty() ? folder : common.out) / "report.html";
+  if (!common.out.empty()) prepare_folder(common.out);
+  write_file(file, report_html(folder));
+  if (common.json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"report", file.string()}}.dump(2));
+  } else if (!common.quiet) {
+    fmt::print("report: {}\n", file.string());
+  }
+  return exit_ok;
+}
+
+}  // namespace flexboom

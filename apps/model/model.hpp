@@ -1,0 +1,45 @@
+#pragma once
+
+#include "fem/assembly/constraints.hpp"
+#include "fem/formats/common/mesh_file.hpp"
+#include "reduction/basis/basis.hpp"
+#include "reduction/body/reduced_body.hpp"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// What replaces or completes a file on the command line.
+struct ModelOptions {
+  std::optional<std::string> clamp;      // node set that is fixed beside the file's own supports
+  std::optional<std::string> material;   // "E,nu,rho" of everything
+  bool free = false;                     // no clamp and no supports
+  std::optional<std::string> structure;  // of a body file: "beam" or "solid"
+  std::optional<std::string> element;    // of a solid made by flexboom
+  std::optional<int> order;
+  std::optional<double> accuracy;
+  ReadOptions read;  // of a mesh file
+};
+
+/// What `modes`, `mesh` and `bench` work on: a body file made into a mesh, or a mesh file.
+struct Model {
+  std::string name;
+  Mesh mesh;
+  Clamp clamp;
+  std::optional<int> modes;            // number of modes that the file asks for
+  std::vector<std::string> notes;      // what was read as something else, and what is most likely a mistake
+  std::optional<std::string> backend;  // eigen-solver that the file asks for
+  DampingRule damping;                 // none of mesh files
+  BasisOptions basis;                  // its names and places; clamped of mesh files
+};
+
+/// @throws InputError naming the file and the place in it, a set that it lacks, or an option that does not apply to it.
+Model load_model(const std::filesystem::path&, const ModelOptions&);
+
+/// "E,nu,rho". @throws InputError.
+Material parse_material(const std::string&);
+
+}  // namespace flexboom

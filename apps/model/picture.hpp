@@ -1,0 +1,20 @@
+#pragma once
+
+#include "apps/model/prepared_body.hpp"
+#include "dynamics/relative/tree.hpp"
+#include "fem/formats/vtk/vtk.hpp"
+
+#include <Eigen/Core>
+
+/// What bodies look like.
+namespace flexboom {
+
+/// A box about the mass centre of a body, with edges: of this size along the axes of the body [m], or where that is
+/// zero the box of equal mass and inertia.
+DisplayShape box_of(const ReducedBody&, const Eigen::Vector3d& size = Eigen::Vector3d::Zero());
+
+/// Bodies where a state of the tree has them, deformed, inertial axes. Point data "displacement" [m], cell data "body"
+/// numbers them from 0.
+VtkGrid picture(const Tree&, double t, const Eigen::VectorXd& y);
+
+}  // namespace flexboom

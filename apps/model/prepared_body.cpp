@@ -1,0 +1,179 @@
+// Bodies of a scene: from what the file says to a reduced body.
+
+#include "apps/model/prepared_body.hpp"
+
+#include "apps/base/version.hpp"
+#include "apps/model/picture.hpp"
+#include "apps/model/reduction.hpp"
+#include "fem/base/check.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "reduction/body_file/body_file.hpp"
+#include "reduction/body_file/sha256.hpp"
+#include "reduction/invariants/eq14.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+PreparedBody prepare_rigid(const BodyScene& b) {
+  const RigidScene& r = *b.rigid;
+  const Matrix3d J =
+      r.inertia + r.mass * (r.centre.squaredNorm() * Matrix3d::Identity() - r.centre * r.centre.transpose());
+  PreparedBody p;
+  p.body = rigid_body(b.name, r.mass, r.mass * r.centre, J);
+  p.body.display = box_of(p.body, r.size);
+  return p;
+}
+
+/// As a file has it.
+PreparedBody prepared(ReducedBody body) {
+  PreparedBody p;
+  p.body = std::move(body);
+  p.dofs = p.body.full_freedoms;
+  p.checks = p.body.certificate;
+  p.modes = p.body.n();
+  return p;
+}
+
+PreparedBody prepare_reduced(const BodyScene& b) {
+  PreparedBody p = prepared(*b.reduced);
+  p.body.name = b.name;
+  if (b.damping.name != "none") apply_damping(p.body, b.damping);  // else the file's
+  if (p.body.display.points.cols() == 0) p.body.display = box_of(p.body);
+  return p;
+}
+
+PreparedBody prepare_eq14(const BodyScene& b) {
+  const BeamSegment& segment = b.geometry.segments.at(0);
+  const Section s = section_of(segment.start, segment.material.nu, b.geometry.shear);
+  const eq14::Boom boom{segment.length, segment.material.rho * s.A, segment.material.E * s.Iz};
+  const bool all = b.directions == "all";
+  require(!all || b.modes % 2 == 0, fmt::format("body {}: eq. 14 has equal modes in two planes: with directions = "
+                                                "\"all\" give an even number of modes, not {}",
+                                                b.name, b.modes));
+  const int per_plane = all ? b.modes / 2 : b.modes;
+  PreparedBody r;
+  r.body = eq14::reduced_body(boom, per_plane, all ? eq14::Planes::xy_and_xz : eq14::Planes::xy, b.name);
+  return r;
+}
+
+Mesh beam_mesh(BeamGeometry geometry, int refine) {
+  constexpr int highest = 12;
+  if (geometry.order + refine <= highest) {
+    geometry.order += refine;
+  } else {
+    for (BeamSegment& segment : geometry.segments) segment.elements = 2 * std::max(segment.elements, 8);
+  }
+  return make_mesh(geometry);
+}
+
+Mesh solid_mesh(const BodyScene& b, int refine) {
+  if (b.solid.element != "hex") {
+    require(refine == 0, fmt::format("body {}: elements {} have no higher order to be compared with; use \"hex\"",
+                                     b.name, b.solid.element));
+    return make_solid_mesh(b.geometry, b.solid);
+  }
+  SolidOptions options = chosen(b.geometry, b.solid);
+  constexpr int highest = 8;
+  options.order = std::min(options.order + refine, highest);
+  return make_solid_mesh(b.geometry, options);
+}
+
+/// What a scene says of a basis, its shapes chosen by `modes` and `directions`.
+BasisOptions basis_of(const BodyScene& b) {
+  BasisOptions o = b.basis;
+  o.modes = b.modes;
+  o.in_plane = b.directions != "all";
+  o.backend = b.backend;
+  return o;
+}
+
+PreparedBody prepare_model(const BodyScene& b, int refine) {
+  Model model;
+  model.name = b.name;
+  model.mesh = mesh_of(b, refine);
+  model.clamp = node_set(model.mesh, b.clamp);
+  ReductionOptions o;
+  o.basis = basis_of(b);
+  if (b.structure == "rigid") o.basis.modes = 0;
+  o.stiffening = !b.stiffening.empty();
+  o.damping = b.damping;
+  o.certified = false;
+  ReductionSeconds seconds;
+  PreparedBody r = prepared(make_reduced_body(model, o, 1, seconds));
+  r.elements = static_cast<int>(model.mesh.elements.size());
+  r.notes = std::move(model.notes);
+  if (b.structure == "rigid") r.body.structure = "rigid";
+  return r;
+}
+
+/// Where a body is kept: its name, and a digest of all that it is made of.
+std::filesystem::path kept_file(const BodyScene& b, int refine, const std::filesystem::path& keep) {
+  const std::string made_of = fmt::format("{}\nrefined {}\nflexboom {}\n", to_toml(b), refine, version);
+  return keep / fmt::format("{}-{}.h5", b.name, sha256(made_of).substr(0, 16));
+}
+
+std::optional<PreparedBody> read_kept(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return {};
+  try {
+    PreparedBody p = prepared(read_body_file(file));
+    p.kept = file;
+    return p;
+  } catch (const InputError&) {
+    return {};  // cut off or changed: it is made anew
+  }
+}
+
+/// Best effort: a folder that cannot be written costs the next run its time, not this one.
+void write_kept(const std::filesystem::path& file, const PreparedBody& p) {
+  std::error_code error;
+  std::filesystem::create_directories(file.parent_path(), error);
+  ReducedBody body = p.body;
+  body.certificate = p.checks;
+  try {
+    write_body_file(file, body);
+  } catch (const InputError&) {
+    return;
+  }
+}
+
+}  // namespace
+
+Mesh mesh_of(const BodyScene& b, int refine) {
+  return b.structure == "solid" ? solid_mesh(b, refine) : beam_mesh(b.geometry, refine);
+}
+
+PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem::path& keep) {
+  if (b.rigid) return prepare_rigid(b);
+  if (b.reduced) return prepare_reduced(b);
+  require(b.structure == "eq14" || b.structure == "beam" || b.structure == "solid" || b.structure == "rigid",
+          fmt::format("body {}: structure '{}' is not available; there are: 'beam', 'solid', 'eq14', 'rigid'", b.name,
+                      b.structure));
+  const std::filesystem::path file =
+      b.structure == "solid" && !keep.empty() ? kept_file(b, refine, keep) : std::filesystem::path();
+  if (!file.empty())
+    if (std::optional<PreparedBody> kept = read_kept(file)) return kept->modes = b.modes, *std::move(kept);
+  PreparedBody r = b.structure == "eq14" ? prepare_eq14(b) : prepare_model(b, refine);
+  apply_damping(r.body, b.damping);
+  r.modes = b.modes;
+  for (const BodyCheck& c : r.checks)
+    if (!c.passed)
+      throw NumericalError(fmt::format("body {}: invariant {} = {:.17g}, but {:.17g} by an independent route", b.name,
+                                       c.name, c.value, c.reference));
+  if (!file.empty()) write_kept(file, r), r.kept = file;
+  return r;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,32 @@
+#pragma once
+
+#include "apps/scene/scene.hpp"
+#include "reduction/body/reduced_body.hpp"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// A body of a scene made ready to fly, with what is known of its quality.
+struct PreparedBody {
+  ReducedBody body;
+  int elements = 0;                // 0 where it was read from a file or is in closed form
+  int dofs = 0;                    // unknowns of the model, 0 in closed form
+  int modes = 0;                   // as BodyScene::modes; other bases have other numbers of coordinates
+  std::vector<BodyCheck> checks;   // empty in closed form
+  std::vector<std::string> notes;  // what the basis has to say
+  std::filesystem::path kept;      // the file that later runs read it from; empty: none
+};
+
+/// Elements of a boom. `refine` raises their order, or where that is the highest makes beams smaller.
+/// @throws InputError for elements that have no higher order.
+Mesh mesh_of(const BodyScene&, int refine = 0);
+
+/// Geometry -> mesh -> K, M -> basis -> reduced body, or the closed form, or the body that the scene gives.
+/// `refine` raises the polynomial order, for error estimates. A solid body is kept in the folder `keep`, if one is
+/// given, and read from there as long as what it is made of is the same. @throws InputError, NumericalError.
+PreparedBody prepare_body(const BodyScene&, int refine = 0, const std::filesystem::path& keep = {});
+
+}  // namespace flexboom

@@ -1,0 +1,229 @@
+#include "apps/results/results_folder.hpp"
+
+#include "apps/base/version.hpp"
+#include "apps/simulate/tree_flight.hpp"
+#include "fem/base/check.hpp"
+#include "fem/base/files.hpp"
+#include "fem/base/stopwatch.hpp"
+#include "fem/formats/vtk/vtk.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <system_error>
+#include <utility>
+
+namespace flexboom {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+namespace {
+
+constexpr std::array result_files = {"summary.json", "trajectory.csv", "events.csv",  "state.toml",
+                                     "scene.toml",   "motion.pvd",     "report.html", "overview.svg"};
+
+constexpr size_t unlimited = std::numeric_limits<size_t>::max();  // rows of long runs are read line by line
+
+bool same_file(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  return fs::equivalent(a, b, error);
+}
+
+/// A run may not replace what it was read from: neither the scene nor a body.
+void check_inputs(const fs::path& folder, const Scene& scene, const fs::path& input) {
+  std::vector<fs::path> inputs = {input};
+  for (const BodyScene& b : scene.bodies) inputs.push_back(b.reduced_file);
+  for (const fs::path& file : inputs)
+    for (const char* result : result_files)
+      require(file.empty() || !same_file(file, folder / result),
+              fmt::format("{} would be overwritten by the results; give another folder by --out", file.string()));
+}
+
+/// What a run needs of the folder in which it goes on, before it computes anything. @throws InputError.
+void check_earlier_run(const fs::path& folder) {
+  for (const char* name : {"trajectory.csv", "events.csv"})
+    require(fs::exists(folder / name), fmt::format("--continue: {} is missing, to which rows would be added; give "
+                                                   "another folder by --out",
+                                                   (folder / name).string()));
+  for (const char* name : result_files)
+    if (fs::exists(folder / name)) require_regular_file(folder / name, unlimited);
+}
+
+/// Adds to a file that is there. @throws InputError.
+void append(const fs::path& path, const std::function<void(std::ostream&)>& write) {
+  errno = 0;
+  std::ofstream out(path, std::ios::binary | std::ios::app);
+  write(out);
+  out.close();
+  require(static_cast<bool>(out),
+          fmt::format("cannot write {}: {}", path.string(),
+                      errno != 0 ? std::generic_category().message(errno) : "the stream failed"));
+}
+
+void copy_head(const fs::path& path, std::uintmax_t bytes, std::ostream& out) {
+  std::ifstream in(path, std::ios::binary);
+  std::array<char, 1 << 16> buffer;
+  while (bytes > 0 && out) {
+    in.read(buffer.data(), static_cast<std::streamsize>(std::min<std::uintmax_t>(bytes, buffer.size())));
+    require(in.gcount() > 0, fmt::format("{} became shorter while it was read", path.string()));
+    out.write(buffer.data(), in.gcount());
+    bytes -= static_cast<std::uintmax_t>(in.gcount());
+  }
+}
+
+/// The lines of a table that an earlier flight wrote: a header, then rows that begin with a time. `wanted` says which
+/// times stay. A last line without an end was being written when that flight was killed.
+struct Head {
+  std::string header, rows;
+  std::uintmax_t bytes = 0;  // of both
+};
+Head head_of(const fs::path& path, bool keep_text, const std::function<bool(double)>& wanted) {
+  std::ifstream in(path, std::ios::binary);
+  require(static_cast<bool>(in), fmt::format("--continue: cannot read {}, to which rows would be added; give another "
+                                             "folder by --out",
+                                             path.string()));
+  Head head;
+  std::string line;
+  for (size_t number = 1; std::getline(in, line) && !in.eof(); ++number) {
+    if (number == 1) {
+      head.header = line;
+    } else {
+      double t = 0;
+      const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), t);
+      require(error == std::errc() && *end == ',',
+              fmt::format("{}:{}: does not begin with a time", path.string(), number));
+      if (!wanted(t)) break;
+      if (keep_text) head.rows += line + '\n';
+    }
+    head.bytes += line.size() + 1;
+  }
+  return head;
+}
+
+bool on_grid(double t, double step) {
+  const double k = t / step;
+  return std::abs(k - std::round(k)) <= 1e-12 * std::max(1.0, k);
+}
+
+}  // namespace
+
+ResultsFolder::ResultsFolder(fs::path path, const Scene& scene, const fs::path& input)
+    : path_(std::move(path)), goes_on_(scene.from && same_file(scene.from->file(), path_ / "state.toml")) {
+  if (scene.from) start_ = scene.from->time();
+  goes_on_ ? check_earlier_run(path_) : check_inputs(path_, scene, input);
+  std::error_code error;
+  fs::create_directories(path_, error);
+  require(!error, fmt::format("cannot make the output folder {}: {}", path_.string(), error.message()));
+  lock_ = std::make_unique<FolderLock>(path_);
+  summary_ = {{"scene", scene.name}, {"version", version}, {"status", "running"}, {"process", getpid()}};
+  if (goes_on_) return;
+  begun_ = true;
+  clear();
+  write_file(path_ / "scene.toml", to_toml(scene));
+  write_summary();
+}
+
+/// Nothing of an older run stays, nor what a killed one left half written.
+void ResultsFolder::clear() {
+  std::error_code ignored;
+  for (const char* name : result_files)
+    for (const char* part : {"", ".part"}) fs::remove(path_ / (std::string(name) + part), ignored);
+  std::vector<fs::path> frames;
+  for (const auto& entry : fs::directory_iterator(path_, ignored)) {
+    const fs::path name = entry.path().filename();
+    if (is_motion_frame((name.extension() == ".part" ? name.stem() : name).string())) frames.push_back(entry.path());
+  }
+  for (const fs::path& frame : frames) fs::remove(frame, ignored);
+}
+
+/// What stays of the flight that this one goes on from: all that came before its start.
+void ResultsFolder::begin(const RunResult& r) {
+  const fs::path rows = path_ / "trajectory.csv";
+  const double before = start_ * (1 - 1e-12);
+  const Head head = head_of(rows, false, [before](double t) { return t < before; });
+  const std::string header = fmt::format("{}", fmt::join(r.outputs.names, ","));
+  require(head.header == header,
+          fmt::format("--continue: {} has other columns than this run; give another folder by --out", rows.string()));
+  rows_before_ = head.bytes;
+  events_before_ = head_of(path_ / "events.csv", true, [this](double t) { return t <= start_; }).rows;
+  skips_first_ = start_ > 0 && !on_grid(start_, r.scene.output_step);
+  const fs::path frames = path_ / "motion.pvd";
+  if (fs::exists(frames)) {
+    for (auto& frame : read_pvd(frames))
+      if (frame.first < before) frames_before_.add(std::move(frame), r.scene.vtu_step);
+    write_pvd(frames, frames_before_.files);
+  }
+  write_file(path_ / "scene.toml", to_toml(r.scene));
+  begun_ = true;
+}
+
+void ResultsFolder::write_rows(std::ostream& out, const OutputTable& table, size_t first) const {
+  if (first == 0 && rows_before_ == 0) out << fmt::format("{}\n", fmt::join(table.names, ","));
+  print_rows(out, table, first == 0 && skips_first_ ? 1 : 0);
+}
+
+void ResultsFolder::add(const RunResult& r, size_t first) {
+  if (!begun_) begin(r);
+  const fs::path rows = path_ / "trajectory.csv", events = path_ / "events.csv";
+  const std::vector<StopEvent>& all = r.trajectory.events;
+  if (first == 0) {
+    write_file(rows, [&](std::ostream& out) {
+      copy_head(rows, rows_before_, out);
+      write_rows(out, r.outputs, 0);
+    });
+    write_file(events, events_header + events_before_);
+    events_ = 0;
+    frames_ = frames_before_;
+  } else {
+    append(rows, [&](std::ostream& out) { write_rows(out, r.outputs, first); });
+  }
+  append(events, [&](std::ostream& out) { out << event_rows(r, std::exchange(events_, all.size())); });
+  if (r.scene.vtu_step > 0) write_motion(r, path_, frames_);
+  write_file(path_ / "state.toml", to_toml(r.end, r.scene.name));
+  summary_ = summary_json(r, 0);
+  summary_["status"] = "running";
+  summary_["process"] = getpid();
+  write_summary();
+}
+
+void ResultsFolder::write(const RunResult& r) {
+  const Stopwatch watch;
+  const fs::path rows = path_ / "trajectory.csv";
+  write_file(path_ / "scene.toml", to_toml(r.scene));
+  write_file(rows, [&](std::ostream& out) {
+    copy_head(rows, rows_before_, out);
+    write_rows(out, r.outputs, 0);
+  });
+  write_file(path_ / "events.csv", events_header + events_before_ + event_rows(r, 0));
+  frames_ = frames_before_;
+  if (r.scene.vtu_step > 0) write_motion(r, path_, frames_);
+  summary_ = summary_json(r, watch.seconds());
+  write_summary();
+  // Last: until everything is there, the state before says from where a run that is killed now can go on.
+  write_file(path_ / "state.toml", to_toml(r.end, r.scene.name));
+}
+
+void ResultsFolder::write_summary() { write_file(path_ / "summary.json", summary_.dump(2) + "\n"); }
+
+void ResultsFolder::fail(const std::string& why) noexcept {
+  if (!begun_) return;
+  try {
+    summary_["status"] = "failed";
+    summary_["error"] = why;
+    summary_.erase("process");
+    write_summary();
+  } catch (const std::exception&) {  // it says "running" still, of a process that is gone
+  }
+}
+
+}  // namespace flexboom

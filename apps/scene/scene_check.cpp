@@ -1,0 +1,227 @@
+#include "apps/base/deflection.hpp"
+#include "apps/scene/keys.hpp"
+#include "apps/scene/scene.hpp"
+#include "apps/scene/scene_checks.hpp"
+#include "apps/scene/scene_keys.hpp"
+#include "apps/scene/scene_law.hpp"
+#include "dynamics/methods/integrator.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+// Comparisons are written so that NaN fails them where a value stands alone, and passes where two values are compared:
+// then the fault is reported at the value that is NaN, once.
+
+namespace flexboom {
+
+using Eigen::Vector3d;
+using toml_reader::Faults;
+
+namespace {
+
+using namespace scene_checks;
+
+constexpr double max_rows = 1e6;  // of trajectory.csv
+
+// After a fault in a name, what refers to bodies by name is not looked at.
+bool body_names_known(const Faults& faults, const Scene& scene) {
+  if (scene.bodies.empty()) return faults.clean("bodies");
+  for (size_t i = 0; i < scene.bodies.size(); ++i) {
+    if (!faults.clean(fmt::format("bodies[{}].name", i))) return false;
+  }
+  return true;
+}
+
+void check_times(Faults& faults, const Scene& scene) {
+  const auto check_rows = [&](const char* key, double step) {
+    if (step > 0 && scene.duration / step > max_rows) {
+      faults.add(key, fmt::format("is {} s: {:.3g} rows in {} s; at most {:g} are written, so make it longer", step,
+                                  scene.duration / step, scene.duration, max_rows));
+    }
+  };
+  check_rows("output_step", scene.output_step);
+  check_rows("vtu_step", scene.vtu_step);
+}
+
+void check_accuracy(Faults& faults, const Scene& scene) {
+  const std::vector<std::string> known = outputs_of(with_joints(scene));
+  const std::vector<std::string_view> names(known.begin(), known.end());
+  if (!body_names_known(faults, scene)) return;
+  for (const std::string& output : scene.outputs) {
+    const auto without = std::ranges::find_if(scene.bodies, [&](const BodyScene& b) {
+      return b.reduced && b.reduced->n() > 0 && output == b.name + ".tip" && !tip_of(*b.reduced);
+    });
+    if (without == scene.bodies.end())
+      check_name_among(faults, "accuracy.outputs", output, names);
+    else
+      faults.add("accuracy.outputs",
+                 fmt::format("names {}, but {}", toml_reader::quoted(output), no_tip(*without->reduced)));
+  }
+}
+
+void check_integrator(Faults& faults, const Scene& scene) {
+  const bool redundant = scene.formulation == "multipliers";
+  std::vector<std::string_view> methods = {"auto"};
+  if (redundant) methods.push_back("ida");
+  for (const IntegratorMethod& m : integrator_methods())
+    if (!redundant) methods.push_back(m.name);
+  check_name_among(faults, "integrator.method", scene.integrator, methods);
+  if (redundant) check_multipliers(scene, faults);
+  const bool has_laws = std::ranges::any_of(scene.joints, [](const JointScene& j) { return j.law.given(); });
+  if (has_laws && scene.integrator == "exponential")
+    faults.add("integrator.method",
+               "is \"exponential\", which simulates no laws of joints; \"auto\", \"adams\", "
+               "\"bdf\", \"dirk\" and \"erk\" do");
+}
+
+void check_hub(Faults& faults, const Scene& scene) {
+  if (!scene.hub.fixed) return;
+  if (scene.bodies.empty()) faults.add("hub.fixed", "is true and there is no body: nothing moves");
+  const auto at_rest = [&](const char* path, const Vector3d& v) {
+    if (v.allFinite() && !v.isZero(0)) faults.add(path, "is not zero but hub.fixed is true; drop one of them");
+  };
+  at_rest("initial.rate", scene.start_rate);
+  at_rest("initial.velocity", scene.start_velocity);
+}
+
+void check_directions(Faults& faults, const std::string& path, const Hinge& hinge) {
+  const double cosine = hinge.stowed.dot(hinge.outward);
+  if (std::abs(cosine) > round_off && faults.clean(join(path, "stowed"))) {
+    faults.add(join(path, "outward"),
+               fmt::format("is not normal to stowed: the angle between them is {:.6g} rad; it must be pi/2",
+                           std::acos(cosine)));
+  }
+}
+
+void check_hinge(Faults& faults, const std::string& path, const HingeScene& hinge) {
+  check_directions(faults, path, hinge.hinge);
+  Joint with_law;
+  with_law.mechanism = hinge.hinge.mechanism, with_law.law = hinge.law;
+  check_law(faults, path, with_law, hinge.start_angle);
+}
+
+void check_body_names(Faults& faults, const Scene& scene) {
+  std::set<std::string> taken = {"hub", "lvlh", "energy"};  // first words of other columns
+  if (scene.is_tree) taken = {"energy", std::string(scene_keys::ground)};
+  for (size_t i = 0; i < scene.bodies.size(); ++i) {
+    const std::string& name = scene.bodies[i].name;
+    if (!taken.insert(name).second) {
+      faults.add(fmt::format("bodies[{}].name", i),
+                 fmt::format("{} is taken; choose another", toml_reader::quoted(name)));
+    }
+  }
+}
+
+// Hinges name bodies that exist, each once.
+void check_hinge_bodies(Faults& faults, const Scene& scene) {
+  std::vector<std::string_view> names;
+  for (const BodyScene& body : scene.bodies) names.push_back(body.name);
+  std::set<std::string> hinged;
+  for (size_t i = 0; i < scene.hinges.size(); ++i) {
+    const std::string path = fmt::format("hinges[{}].body", i);
+    const std::string& body = scene.hinges[i].body;
+    if (names.empty()) {
+      faults.add(path, fmt::format("is {}, but the scene has no bodies; give [[bodies]]", toml_reader::quoted(body)));
+    } else {
+      check_name_among(faults, path, body, names);
+    }
+    if (!hinged.insert(body).second) {
+      faults.add(path, fmt::format("{} has a hinge already; each body takes one", toml_reader::quoted(body)));
+    }
+  }
+}
+
+// Each body hangs on a hinge. Silent after a fault in what a hinge says of its body, which would be
+// repeated here.
+void check_connections(Faults& faults, const Scene& scene) {
+  if (!body_names_known(faults, scene)) return;
+  check_hinge_bodies(faults, scene);
+  if (scene.hinges.empty() && !faults.clean("hinges")) return;
+  std::set<std::string> hinged;
+  for (size_t i = 0; i < scene.hinges.size(); ++i) {
+    if (!faults.clean(fmt::format("hinges[{}].body", i))) return;
+    hinged.insert(scene.hinges[i].body);
+  }
+  for (size_t i = 0; i < scene.bodies.size(); ++i) {
+    const BodyScene& body = scene.bodies[i];
+    const std::string path = fmt::format("bodies[{}]", i);
+    if (!hinged.contains(body.name)) {
+      faults.add(path, fmt::format("\"{0}\" has no hinge; give [[hinges]] with body = \"{0}\"", body.name));
+    }
+  }
+}
+
+}  // namespace
+
+void check_shorthand(const Scene& scene, Faults& faults) {
+  check_keys(faults, "", scene, shorthand_keys);
+  check_hub(faults, scene);
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].name == "hub" && !scene.hub.fixed)
+      faults.add(fmt::format("bodies[{}].name", i), "\"hub\" is the body of [hub]; choose another");
+  for (size_t i = 0; i < scene.hinges.size(); ++i) check_hinge(faults, fmt::format("hinges[{}]", i), scene.hinges[i]);
+  if (body_names_known(faults, scene)) check_hinge_bodies(faults, scene);
+}
+
+void check_scene(const Scene& scene, Faults& faults) {
+  check_keys(faults, "", scene, scene_keys_of_file);
+  check_times(faults, scene);
+  check_integrator(faults, scene);
+  if (!scene.is_tree) check_hub(faults, scene);
+  const bool in_field = scene.orbit && scene.orbit->gravity != "none";
+  if (in_field && scene.hub.fixed)
+    faults.add("orbit.gravity", "acts on bodies in orbit, but hub.fixed is true; drop one of them");
+  if (in_field && !scene.gravity.isZero(0))
+    faults.add("gravity", "is uniform, and orbit.gravity is that of the Earth; drop one of them");
+  for (const JointScene& j : scene.joints)
+    if (in_field && j.a.body.empty() && j.kind != JointKind::free)
+      faults.add("orbit.gravity",
+                 fmt::format("acts on bodies in orbit, but joint {} holds one in the frame of the orbit", j.name));
+  for (size_t i = 0; i < scene.bodies.size(); ++i) check_body(scene.bodies[i], fmt::format("bodies[{}]", i), faults);
+  for (size_t i = 0; i < scene.hinges.size(); ++i) check_hinge(faults, fmt::format("hinges[{}]", i), scene.hinges[i]);
+  check_body_names(faults, scene);
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (const BasisOptions& basis = scene.bodies[i].basis; basis.name == "hinge" && basis.hinge_stiffness.empty())
+      faults.add(fmt::format("bodies[{}].hinge_stiffness", i),
+                 "is missing: no hinge carries the body whose stiffness could be taken; give it [N m/rad]");
+  check_accuracy(faults, scene);
+  scene.is_tree ? check_tree(scene, faults) : check_connections(faults, scene);
+}
+
+void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
+  const auto look = [&](const std::string& of, const HingeMechanism& m, double start, std::string_view unit) {
+    if (m.stop_stiffness == 0) return;
+    if (m.stiffness > 0 && m.rest > m.threshold)
+      warnings.push_back(
+          fmt::format("{}: the spring is at rest at {:g} {}, beyond the stop at {:g} {}: it presses on it", of, m.rest,
+                      unit, m.threshold, unit));
+    if (start > m.threshold)
+      warnings.push_back(
+          fmt::format("{}: starts at {:g} {}, beyond the stop at {:g} {}: the stop is pressed in by {:g} {}", of, start,
+                      unit, m.threshold, unit, start - m.threshold, unit));
+  };
+  for (const HingeScene& h : scene.hinges) look("hinge " + h.body, h.hinge.mechanism, h.start_angle, "rad");
+  for (const JointScene& j : scene.joints)
+    if (joint_type(j.kind).scalars == 1)
+      look("joint " + j.name, j.mechanism, j.start.empty() ? j.mechanism.rest : j.start[0],
+           j.kind == JointKind::slider ? "m" : "rad");
+  for (const BodyScene& b : scene.bodies)
+    if (b.reduced)
+      for (const BodyCheck& c : b.reduced->certificate)
+        if (!c.passed)
+          warnings.push_back(
+              fmt::format("body {}: its file {} fails its own check \"{}\": {:.6g}, not {:.6g}; make it anew", b.name,
+                          b.reduced_file.string(), c.name, c.value, c.reference));
+}
+
+void validate(const Scene& scene) {
+  Faults faults;
+  check_scene(scene, faults);
+  faults.throw_if_any();
+}
+
+}  // namespace flexboom

@@ -1,0 +1,281 @@
+// Checks of [[joints]], [[springs]], [[loads]], [[wheels]] and [[turns]].
+
+#include "apps/scene/keys.hpp"
+#include "apps/scene/scene.hpp"
+#include "apps/scene/scene_checks.hpp"
+#include "apps/scene/scene_keys.hpp"
+#include "apps/scene/scene_law.hpp"
+#include "fem/base/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace flexboom {
+namespace {
+
+using namespace scene_checks;
+using toml_reader::Faults;
+
+/// Looks up what joints, forces and wheels refer to.
+class TreeCheck {
+ public:
+  TreeCheck(const Scene& scene, Faults& faults) : scene_(scene), faults_(faults) {}
+
+  void run() {
+    if (scene_.joints.empty())
+      faults_.add("joints", "has no joint; each body hangs on one, free ones on a joint of kind \"free\"");
+    check_names();
+    each("joints", scene_.joints, [this](const auto& path, const JointScene& j) { joint(path, j); });
+    each("springs", scene_.springs, [this](const auto& path, const SpringScene& s) { spring(path, s); });
+    each("loads", scene_.loads, [this](const auto& path, const LoadScene& l) { load(path, l); });
+    each("wheels", scene_.wheels, [this](const auto& path, const WheelScene& w) { wheel(path, w); });
+    each("turns", scene_.turns, [this](const auto& path, const TurnScene& t) { turn(path, t); });
+    if (!scene_.turns.empty()) turning_body();
+    if (faults_.clean("joints") && bodies_known()) topology();
+  }
+
+ private:
+  template <class Items, class Check>
+  void each(const char* what, const Items& items, Check check) {
+    for (size_t i = 0; i < items.size(); ++i) check(fmt::format("{}[{}]", what, i), items[i]);
+  }
+
+  bool bodies_known() const {
+    for (size_t i = 0; i < scene_.bodies.size(); ++i)
+      if (!faults_.clean(fmt::format("bodies[{}].name", i))) return false;
+    return !scene_.bodies.empty() || faults_.clean("bodies");
+  }
+
+  // A joint may have the name of the body it carries; its columns are others.
+  void check_names() {
+    const auto unique = [this](const char* what, const auto& items) {
+      std::set<std::string> taken = {"energy"};
+      each(what, items, [&](const std::string& path, const auto& item) {
+        if (!taken.insert(item.name).second)
+          faults_.add(path + ".name", fmt::format("{} is taken; choose another", toml_reader::quoted(item.name)));
+      });
+    };
+    unique("joints", scene_.joints), unique("springs", scene_.springs), unique("loads", scene_.loads);
+    unique("wheels", scene_.wheels);
+  }
+
+  const BodyScene* body_named(const std::string& path, const std::string& name) {
+    std::vector<std::string_view> names;
+    for (const BodyScene& b : scene_.bodies) {
+      if (b.name == name) return &b;
+      names.push_back(b.name);
+    }
+    if (!bodies_known()) return nullptr;
+    names.push_back(scene_keys::ground);
+    faults_.add(path, toml_reader::not_among(name, names));
+    return nullptr;
+  }
+
+  void place(const std::string& path, const PlaceScene& p) {
+    if (std::abs(p.x.dot(p.z)) > round_off && faults_.clean(path + ".z"))
+      faults_.add(path + ".x", fmt::format("is not normal to z, [{}, {}, {}]; it must be", p.z.x(), p.z.y(), p.z.z()));
+    if (p.body.empty()) {
+      if (!p.marker.empty()) faults_.add(path + ".marker", "needs a body; the inertial frame has none, give a point");
+      return;
+    }
+    const BodyScene* body = body_named(path + ".body", p.body);
+    if (!body) return;
+    if (p.marker.empty() && body->root_moves() && body->is_elastic())
+      faults_.add(path + ".point",
+                  "is a point of the frame, which no material of this body follows: its basis moves the root, too; "
+                  "give a marker");
+    if (p.marker.empty()) return;
+    const std::vector<std::string> names = marker_names(*body);
+    if (names.empty()) return faults_.add(path + ".marker", fmt::format("a rigid body has none; give a point"));
+    check_name_among(faults_, path + ".marker", p.marker, std::vector<std::string_view>(names.begin(), names.end()));
+  }
+
+  void course(const std::string& path, const CourseScene& c) {
+    if (!c.given()) return;
+    try {
+      course_of(c, scene_.duration);
+    } catch (const InputError& error) {
+      faults_.add(path, error.what());
+    }
+  }
+
+  void joint(const std::string& path, const JointScene& j) {
+    const JointType& type = joint_type(j.kind);
+    const bool scalar = type.scalars == 1;
+    place(path + ".a", j.a);
+    place(path + ".b", j.b);
+    if (j.b.body.empty())
+      faults_.add(path + ".b", "has no body; a is the place nearer to the inertial frame, b is on a body");
+    const HingeMechanism& m = j.mechanism;
+    const auto mechanism = [&](const char* key, double value) {
+      if (value > 0 && !scalar)
+        faults_.add(path + "." + key, fmt::format("a {} joint has none; hinges and sliders have", type.name));
+    };
+    mechanism("stiffness", m.stiffness), mechanism("damping", m.damping), mechanism("stop_stiffness", m.stop_stiffness);
+    Joint with_law;
+    with_law.kind = j.kind, with_law.mechanism = m, with_law.law = j.law;
+    with_law.prescribed.resize(j.motion.size());
+    check_law(faults_, path, with_law, !j.start.empty() ? j.start[0] : m.stiffness > 0 ? m.rest : 0);
+    course(path + ".drive", j.drive);
+    if (j.drive.given() && !scalar)
+      faults_.add(path + ".drive", fmt::format("a {} joint has none; hinges and sliders have", type.name));
+    motion(path, j, type);
+    start(path, j, type);
+    if (j.closes_loop) loop(path, j);
+  }
+
+  void loop(const std::string& path, const JointScene& j) {
+    if (scene_.formulation != "multipliers")
+      faults_.add(path + ".closes_loop", "is true: a loop needs [integrator] formulation = \"multipliers\"");
+    if (j.a.body == j.b.body)
+      faults_.add(path + ".b",
+                  fmt::format("is on {} as a is; a joint is between two bodies", toml_reader::quoted(j.b.body)));
+    const JointScene none;
+    const bool starts = !j.start.empty() || !j.start_rate.empty() || j.start_attitude != none.start_attitude ||
+                        !j.start_omega.isZero(0) || !j.start_position.isZero(0) || !j.start_velocity.isZero(0);
+    if (starts)
+      faults_.add(path + ".closes_loop", "is true, so the start of the joint follows from the others; drop its own");
+  }
+
+  void motion(const std::string& path, const JointScene& j, const JointType& type) {
+    for (const CourseScene& c : j.motion) course(path + ".motion", c);
+    if (j.motion.empty()) return;
+    if (type.scalars == 0)
+      faults_.add(path + ".motion",
+                  fmt::format("a {} joint cannot be given one; hinge, slider and universal can", type.name));
+    else if (std::ssize(j.motion) != type.scalars)
+      faults_.add(path + ".motion",
+                  fmt::format("has {} functions; a {} joint needs {}", j.motion.size(), type.name, type.scalars));
+    if (j.drive.given())
+      faults_.add(path + ".drive", "is given beside motion, whose torque is an output; give one of them");
+    if (!j.start.empty() || !j.start_rate.empty())
+      faults_.add(path + (j.start.empty() ? ".start_rate" : ".start"),
+                  "is given beside motion, which says it; give one of them");
+  }
+
+  void start(const std::string& path, const JointScene& j, const JointType& type) {
+    const auto scalars = [&](const char* key, const std::vector<double>& v) {
+      if (v.empty() || std::ssize(v) == type.scalars) return;
+      faults_.add(path + "." + key,
+                  type.scalars == 0
+                      ? fmt::format("a {} joint has start_attitude and its like, if any", type.name)
+                      : fmt::format("has {} numbers; a {} joint needs {}", v.size(), type.name, type.scalars));
+    };
+    scalars("start", j.start), scalars("start_rate", j.start_rate);
+    const auto vector = [&](const char* key, const Eigen::Vector3d& v, bool has) {
+      if (!has && !v.isZero(0)) faults_.add(path + "." + key, fmt::format("a {} joint has none", type.name));
+    };
+    vector("start_omega", j.start_omega, type.turns);
+    vector("start_position", j.start_position, type.floats);
+    vector("start_velocity", j.start_velocity, type.floats);
+    if (!type.turns && j.start_attitude != Eigen::Vector4d(1, 0, 0, 0))
+      faults_.add(path + ".start_attitude", fmt::format("a {} joint has none", type.name));
+  }
+
+  void spring(const std::string& path, const SpringScene& s) {
+    place(path + ".a", s.a);
+    place(path + ".b", s.b);
+  }
+
+  void load(const std::string& path, const LoadScene& l) {
+    place(path + ".at", l.at);
+    if (l.at.body.empty()) faults_.add(path + ".at", "has no body to act on");
+    for (const CourseScene& c : l.force) course(path + ".force", c);
+    for (const CourseScene& c : l.torque) course(path + ".torque", c);
+  }
+
+  void wheel(const std::string& path, const WheelScene& w) {
+    body_named(path + ".body", w.body);
+    course(path + ".torque", w.torque);
+  }
+
+  void turn(const std::string& path, const TurnScene& t) {
+    if (t.body != scene_.turns.front().body)
+      faults_.add(path + ".body", fmt::format("is not {}, the body of the first turn; all turns are of one body",
+                                              toml_reader::quoted(scene_.turns.front().body)));
+    if (faults_.clean(path)) try {
+        rest_to_rest(t.manoeuvre);
+      } catch (const InputError& error) {
+        faults_.add(path, error.what());
+      }
+  }
+
+  /// The torques of the wheels are those of a free body at rest with three wheels.
+  void turning_body() {
+    const std::string& body = scene_.turns.front().body;
+    if (!body_named("turns[0].body", body)) return;
+    std::vector<Eigen::Vector3d> axes;
+    bool rest = true;
+    for (const WheelScene& w : scene_.wheels) {
+      if (w.body == body && !w.torque.given()) axes.push_back(w.axis);
+      rest = rest && w.spin == 0;
+    }
+    if (axes.size() != 3 || std::abs(axes[0].cross(axes[1]).dot(axes[2])) < 0.1)
+      faults_.add("turns[0].body", fmt::format("{} has {} wheels without a torque of their own; three are needed, with "
+                                               "axes that span space",
+                                               toml_reader::quoted(body), axes.size()));
+    bool free = false;
+    for (const JointScene& j : scene_.joints) {
+      free = free || (j.kind == JointKind::free && j.a.body.empty() && j.b.body == body);
+      rest = rest && j.start_omega.isZero(0) && j.start_velocity.isZero(0) &&
+             std::ranges::all_of(j.start_rate, [](double v) { return v == 0; });
+    }
+    if (!free)
+      faults_.add("turns[0].body",
+                  fmt::format("{} can not turn: it needs a joint of kind \"free\" to the inertial frame",
+                              toml_reader::quoted(body)));
+    if (std::ranges::any_of(scene_.joints, [](const JointScene& j) { return j.closes_loop; }))
+      faults_.add("turns", "need a tree: with closed loops give the wheels their torques");
+    if (!rest) faults_.add("turns", "start from rest: joints and wheels must have no rates at t = 0");
+  }
+
+  /// Each body hangs on one joint, and following them leads to the inertial frame.
+  void topology() {
+    std::map<std::string, size_t> carrier;
+    for (size_t i = 0; i < scene_.joints.size(); ++i) {
+      const JointScene& j = scene_.joints[i];
+      if (j.closes_loop) continue;
+      const auto [first, only] = carrier.emplace(j.b.body, i);
+      if (!only)
+        faults_.add(fmt::format("joints[{}].b", i),
+                    fmt::format("body {} hangs on joint {} already: this one closes a loop; it may start from another "
+                                "body, or say closes_loop = true",
+                                toml_reader::quoted(j.b.body), toml_reader::quoted(scene_.joints[first->second].name)));
+    }
+    for (size_t i = 0; i < scene_.bodies.size(); ++i) {
+      const std::string& name = scene_.bodies[i].name;
+      if (!carrier.contains(name)) {
+        faults_.add(fmt::format("bodies[{}]", i),
+                    fmt::format("{} hangs on no joint; if it is free, give it one of kind \"free\"",
+                                toml_reader::quoted(name)));
+      } else if (!leads_home(name, carrier)) {
+        faults_.add(fmt::format("joints[{}].a", carrier[name]),
+                    fmt::format("body {} hangs on itself in a circle of joints; one of them must start from the "
+                                "inertial frame",
+                                toml_reader::quoted(name)));
+      }
+    }
+  }
+
+  bool leads_home(std::string name, const std::map<std::string, size_t>& carrier) const {
+    for (size_t step = 0; step <= scene_.joints.size(); ++step) {
+      if (name.empty()) return true;
+      const auto joint = carrier.find(name);
+      if (joint == carrier.end()) return true;  // reported elsewhere
+      name = scene_.joints[joint->second].a.body;
+    }
+    return false;
+  }
+
+  const Scene& scene_;
+  Faults& faults_;
+};
+
+}  // namespace
+
+void check_tree(const Scene& scene, Faults& faults) { TreeCheck(scene, faults).run(); }
+
+}  // namespace flexboom

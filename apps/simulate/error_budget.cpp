@@ -1,0 +1,197 @@
+#include "apps/simulate/error_budget.hpp"
+
+#include "fem/base/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+namespace flexboom {
+
+namespace {
+
+/// Does the model of any body leave elasticity or modes out? What is said to be rigid is.
+bool any_elastic(const Scene& scene, std::string_view structure = "") {
+  return std::ranges::any_of(scene.bodies, [&](const BodyScene& b) {
+    return b.is_boom() && b.structure != "rigid" && (structure.empty() || b.structure == structure);
+  });
+}
+
+/// The first body that was reduced before, from a model that has more to say.
+const BodyScene* any_reduced(const Scene& scene) {
+  const auto found = std::ranges::find_if(
+      scene.bodies, [](const BodyScene& b) { return b.reduced && b.reduced->structure != "rigid"; });
+  return found == scene.bodies.end() ? nullptr : &*found;
+}
+
+/// Two more modes in each plane, and both planes: what bends out of the hinge plane counts as left out, too.
+Scene with_more_modes(Scene scene) {
+  for (BodyScene& b : scene.bodies) {
+    if (b.structure == "rigid" || !b.is_boom()) continue;
+    b.modes = b.directions == "all" ? b.modes + 4 : 2 * (b.modes + 2);
+    b.directions = "all";
+  }
+  return scene;
+}
+
+/// Without the columns of elastic coordinates: those of another basis have other meanings.
+OutputTable without_coordinates(const OutputTable& table) {
+  OutputTable r{table.names, table.values};
+  for (std::string& name : r.names)
+    if (name.find(".q") != std::string::npos) name += " (of this basis)";
+  return r;
+}
+
+/// What fills a budget.
+struct Measuring {
+  const RunHooks& hooks;
+  std::vector<std::string>& plan;
+  ErrorBudget budget;
+
+  bool stopped() const { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
+
+  double missing(std::string_view part, std::string_view why) {
+    budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
+    return unknown;
+  }
+
+  /// What `repeat` says; the run that is repeated outlives its failure.
+  template <class Repeat>
+  double measured(std::string_view part, const Repeat& repeat) {
+    try {
+      return repeat();
+    } catch (const std::runtime_error& e) {
+      return missing(part, e.what());
+    }
+  }
+};
+
+/// Repeats the run ten times tighter until the difference is within the tolerance; the tighter run then takes its
+/// place. Returns the difference. `flown` is the scene of the run that was kept.
+double settle_time_error(const Scene& scene, Scene& flown, Run& run, Measuring& m) {
+  constexpr int most = 3;
+  for (int i = 1;; ++i) {
+    Scene tight = flown;
+    tight.tolerance /= 10;
+    Run finer = run_once(tight, m.hooks);
+    const double error = largest(compare_outputs(run.outputs, finer.outputs, scene.outputs));
+    if (error <= scene.tolerance || i == most || m.stopped() || tight.tolerance < 1e-13) return error;
+    run = std::move(finer);
+    flown = tight;
+    m.plan.push_back(fmt::format(
+        "time integration: changed by {:.1e} at a tenth of the tolerance, so that run is the one kept (integrator "
+        "tolerance {:.0e})",
+        error, tight.tolerance));
+  }
+}
+
+/// Difference of the outputs of another flight at a bearable cost.
+double change(const Run& run, const Scene& other, int refine, const RunHooks& hooks) {
+  const long bearable = 20 * run.motion.summary.steps + 10000;
+  const OutputTable repeated = without_coordinates(run_once(other, hooks, refine, bearable).outputs);
+  return largest(compare_outputs(without_coordinates(run.outputs), repeated, other.outputs));
+}
+
+/// The modes left out, first with few digits: more only where the answer would drown in the error of time integration.
+double truncation_error(const Run& run, const Scene& flown, const RunHooks& hooks) {
+  Scene more = with_more_modes(flown);
+  more.tolerance = std::max(flown.tolerance, 1e-5);
+  const double error = change(run, more, 0, hooks);
+  if (more.tolerance == flown.tolerance || !(error <= 10 * more.tolerance)) return error;
+  more.tolerance = flown.tolerance;
+  return change(run, more, 0, hooks);
+}
+
+Scene with_stiffening(Scene scene) {
+  for (BodyScene& b : scene.bodies)
+    if (!b.rigid && b.structure != "rigid") b.stiffening = "on";
+  return scene;
+}
+
+/// What geometric stiffness changes where it is left out, and what then is left out still: of the order of the
+/// deflection squared.
+double linearisation_error(const Run& run, const Scene& flown, Measuring& m) {
+  bool left_out = false;
+  double deflection = 0;
+  const std::vector<BodyScene> bodies = with_joints(flown).bodies;
+  for (size_t i = 0; i < run.bodies.size(); ++i) {
+    const ReducedBody& body = run.bodies[i].body;
+    if (body.n() == 0) continue;
+    if (body.Kg.spin.empty() && (body.structure == "eq14" || !bodies[i].is_boom()))
+      return m.missing("linearisation", fmt::format("body {} has no geometric stiffness", body.name));
+    left_out = left_out || run.tree->stiffening(static_cast<int>(i)) == Stiffening::off;
+    deflection = std::max(deflection, run.bending[i].of_length);
+  }
+  return (left_out ? change(run, with_stiffening(flown), 0, m.hooks) : 0) + deflection * deflection;
+}
+
+}  // namespace
+
+ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
+  Measuring m{hooks, plan, {}};
+  ErrorBudget& budget = m.budget;
+  Scene flown = scene;
+  const BodyScene* reduced = any_reduced(scene);
+  const std::string finished =
+      reduced ? fmt::format("body {} was reduced before, and its file has no more", reduced->name) : "";
+  budget.time = m.measured("time", [&] { return settle_time_error(scene, flown, run, m); });
+  if (!m.stopped()) {
+    if (reduced)
+      budget.truncation = m.missing("truncation", finished + " modes");
+    else if (scene.from && any_elastic(scene))
+      budget.truncation = m.missing("truncation", "a saved state knows nothing of modes beyond its own");
+    else
+      budget.truncation =
+          any_elastic(scene) ? m.measured("truncation", [&] { return truncation_error(run, flown, hooks); }) : 0;
+  }
+  if (!m.stopped()) {
+    if (reduced && reduced->reduced->structure != "eq14")
+      budget.discretisation = m.missing("discretisation", finished + " elements");
+    else
+      budget.discretisation =
+          any_elastic(scene, "beam") ? m.measured("discretisation", [&] { return change(run, flown, 2, hooks); }) : 0;
+  }
+  if (!m.stopped())
+    budget.linearisation = m.measured("linearisation", [&] { return linearisation_error(run, flown, m); });
+  budget.measured = !m.stopped();
+  for (const std::string& line : budget.missing) plan.push_back("error budget: " + line);
+  return budget;
+}
+
+void choose_modes(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
+  constexpr int most = 4;
+  std::vector<size_t> automatic;
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (std::exchange(scene.bodies[i].modes_auto, false) && scene.bodies[i].structure != "rigid")
+      automatic.push_back(i);
+  if (automatic.empty()) return;
+  const auto set_modes = [&](int n) {
+    for (const size_t i : automatic) scene.bodies[i].modes = scene.bodies[i].directions == "all" ? 2 * n : n;
+  };
+  const auto with_modes = [&](int n) {
+    set_modes(n);
+    Scene sketch = scene;  // a choice needs no more digits than this
+    sketch.tolerance = std::max(scene.tolerance, 1e-5);
+    return without_coordinates(run_once(sketch, hooks).outputs);
+  };
+  OutputTable fewer = with_modes(1);
+  for (int n = 1; n < most; ++n) {
+    OutputTable more = with_modes(n + 1);
+    if (hooks.interrupt != nullptr && hooks.interrupt->load()) return;
+    const double error = largest(compare_outputs(fewer, more, scene.outputs));
+    if (error <= scene.tolerance) {
+      set_modes(n);
+      plan.push_back(
+          fmt::format("modes: {} per plane: one more changes the outputs by {:.2e}, within the tolerance", n, error));
+      return;
+    }
+    plan.push_back(fmt::format("modes: {} per plane are not enough: one more changes the outputs by {:.2e}", n, error));
+    fewer = std::move(more);
+  }
+  plan.push_back(fmt::format("modes: {} per plane, the most that are tried", most));
+}
+
+}  // namespace flexboom

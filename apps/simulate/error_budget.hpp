@@ -1,0 +1,20 @@
+#pragma once
+
+#include "apps/simulate/simulate.hpp"
+
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// Repeats a run with a tighter tolerance, more modes in and out of the hinge plane, and a finer mesh, and compares the
+/// outputs wanted. When the tighter run differs by more than the tolerance it takes the place of `run`, and `plan` says
+/// so.
+/// @throws InputError, NumericalError as run_scene.
+ErrorBudget measure_budget(const Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan);
+
+/// Sets the number of modes of every body that leaves it to the program: the first for which one more changes the
+/// outputs wanted by less than the tolerance.
+void choose_modes(Scene&, const RunHooks&, std::vector<std::string>& plan);
+
+}  // namespace flexboom

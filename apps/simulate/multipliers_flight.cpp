@@ -1,0 +1,262 @@
+// Scenes in redundant coordinates: start, flight, and what results are made of in terms of the tree.
+
+#include "apps/simulate/multipliers_flight.hpp"
+
+#include "apps/simulate/tree_flight.hpp"
+#include "dynamics/simulation/formulations.hpp"
+#include "fem/base/stopwatch.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <memory>
+#include <numbers>
+#include <utility>
+
+namespace flexboom {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Angles where the hinges start: a turn more is another stretch of their springs. `saved`: knows those of loops.
+std::vector<double> start_angles(const Multibody& scene, const TreeState& start, const SavedState* saved) {
+  std::vector<double> angles;
+  auto of_tree = start.joints.begin();
+  for (const Joint& j : scene.joints) {
+    angles.push_back(saved ? saved->loop_angle(j.name, j.mechanism.rest) : j.mechanism.rest);
+    if (j.closes_loop) continue;
+    if (!of_tree->coordinate.empty()) angles.back() = of_tree->coordinate[0];
+    ++of_tree;
+  }
+  return angles;
+}
+
+MultipliersOptions multipliers_options(const IntegratorOptions& o, std::vector<double> angles) {
+  MultipliersOptions r{o};
+  r.angles = std::move(angles);
+  return r;
+}
+
+IntegrationSummary summary_of(const MultipliersSummary& s) {
+  IntegrationSummary r;
+  r.method = "ida";
+  r.steps = s.steps, r.rhs_evaluations = s.residual_evaluations, r.jacobian_evaluations = s.factorisations;
+  r.factorisations = s.factorisations, r.newton_iterations = s.newton_iterations;
+  r.error_test_failures = s.error_test_failures, r.restarts = s.restarts;
+  r.seconds = s.seconds;
+  r.energy_balance = s.energy_balance, r.momentum_drift = s.momentum_drift, r.largest = s.largest;
+  r.constraint_drift = std::max({s.position_drift, s.angle_drift, s.quaternion_drift});
+  r.stops = s.stops;
+  r.interrupted = s.interrupted;
+  return r;
+}
+
+void set_energies(MultipliersOptions& o, const Multibody& scene, const TreeLayout& l, const VectorXd& y0) {
+  o.dissipated = y0[l.dissipated_elsewhere];
+  o.work = y0[l.work];
+  auto of_tree = l.joints.begin();
+  for (const Joint& j : scene.joints) {
+    o.lost.emplace_back();
+    if (j.closes_loop) continue;
+    const TreeLayout::Joint& at = *of_tree++;
+    const HingeMechanism& m = j.mechanism;
+    if (j.law.given() || m.stiffness != 0 || m.damping != 0 || m.stop_stiffness != 0)
+      o.lost.back() = {y0[at.dissipated]};
+    else
+      o.dissipated += y0[at.dissipated];
+    for (int k = 0; at.losses >= 0 && k < static_cast<int>(law_losses.size()); ++k)
+      o.lost.back().push_back(y0[at.losses + k]);
+  }
+}
+
+TreeState without_loops(const Scene& scene, TreeState s) {
+  std::vector<JointState> joints;
+  for (size_t i = 0; i < scene.joints.size(); ++i)
+    if (!scene.joints[i].closes_loop) joints.push_back(std::move(s.joints[i]));
+  s.joints = std::move(joints);
+  return s;
+}
+
+/// The turns of universal joints nearest to the outputs before.
+void follow_turns(const TreeState& before, TreeState& s) {
+  constexpr double turn = 2 * std::numbers::pi;
+  for (size_t i = 0; i < s.joints.size(); ++i)
+    for (size_t k = 0; s.joints[i].coordinate.size() == 2 && k < 2; ++k) {
+      double& angle = s.joints[i].coordinate[k];
+      angle += turn * std::round((before.joints[i].coordinate[k] - angle) / turn);
+    }
+}
+
+/// Those of the rows that `states` does not have yet.
+void add_states(const Multipliers& system, const MultibodyTrajectory& flight, std::vector<TreeState>& states) {
+  while (states.size() < flight.states.size()) {
+    TreeState s = tree_state(system, flight.states[states.size()]);
+    if (!states.empty()) follow_turns(states.back(), s);
+    states.push_back(std::move(s));
+  }
+}
+
+/// Energies as the tree has them: the potential of gravity apart, mechanisms of loops among the elastic ones.
+Balance balance_of(const Tree& tree, const MultibodyTrajectory& flight, size_t row, const VectorXd& y) {
+  Balance b;
+  b.kinetic = flight.balance[row].kinetic;
+  b.potential = tree.balance(flight.time[row], y).potential;
+  b.elastic = flight.balance[row].elastic - b.potential;
+  b.dissipated = flight.states[row].dissipated, b.work = flight.states[row].work;
+  return b;
+}
+
+/// At every output of a short list, at some of a long one.
+std::vector<LargestStiffening> largest_stiffening(const Multipliers& system, const MultibodyTrajectory& flight) {
+  std::vector<LargestStiffening> largest(system.multibody().bodies.size());
+  const size_t stride = flight.states.size() / 500 + 1;
+  for (size_t row = 0; row < flight.states.size(); row += stride)
+    observe(stiffening_effect(system, flight.states[row]), flight.time[row], largest);
+  return largest;
+}
+
+std::vector<std::string> warnings_of(const Scene& scene, const Multibody& bodies, const MultibodyTrajectory& flight,
+                                     const std::vector<LargestStiffening>& effect,
+                                     const std::vector<Stiffening>& stiffening) {
+  std::vector<std::string> warnings = stiffening_warnings(
+      bodies, effect, scene.tolerance, [&](int body) { return stiffening[static_cast<size_t>(body)]; });
+  if (const auto& rows = flight.summary.redundant; !rows.empty())
+    warnings.push_back(
+        fmt::format("{} constraint rows follow from the others and are left out, so how these joints share such loads "
+                    "is not determined: {}",
+                    rows.size(), fmt::join(rows, "; ")));
+  return warnings;
+}
+
+/// Where closing the loops moved a joint away from the start it was given.
+void note_moved_starts(const Scene& scene, const TreeState& asked, const TreeState& first,
+                       std::vector<std::string>& notes) {
+  for (size_t i = 0, of_tree = 0; i < scene.joints.size(); ++i) {
+    const JointScene& j = scene.joints[i];
+    if (j.closes_loop) continue;
+    const JointState& wanted = asked.joints[of_tree++];
+    for (size_t k = 0; k < wanted.coordinate.size(); ++k)
+      if (std::abs(first.joints[i].coordinate[k] - wanted.coordinate[k]) > scene.tolerance)
+        notes.push_back(fmt::format("joint {}: starts at {:.6g}, not {:.6g}, so that the loops close", j.name,
+                                    first.joints[i].coordinate[k], wanted.coordinate[k]));
+  }
+}
+
+/// A flight and its states in terms of the tree.
+struct FlownByMultipliers {
+  const Scene& scene;
+  const Multipliers& system;
+  const Tree& tree;
+  const MultibodyTrajectory& flight;
+  const std::vector<TreeState>& states;
+
+  VectorXd y(size_t row) const {
+    VectorXd y = tree.pack(without_loops(scene, states[row]));
+    double elsewhere = flight.states[row].dissipated;
+    auto of_tree = tree.layout().joints.begin();
+    for (size_t i = 0; i < scene.joints.size(); ++i) {
+      if (scene.joints[i].closes_loop) continue;
+      const TreeLayout::Joint& at = *of_tree++;
+      const std::vector<double>& lost = flight.states[row].lost[i];
+      for (size_t k = 0; k < lost.size(); ++k) {
+        y[k == 0 ? at.dissipated : at.losses + static_cast<int>(k) - 1] = lost[k];
+        elsewhere -= lost[k];
+      }
+    }
+    y[tree.layout().dissipated_elsewhere] = elsewhere;
+    y[tree.layout().work] = flight.states[row].work;
+    return y;
+  }
+};
+
+/// What results are made of: the rows from `first` on that come before `last`, and where the flight is.
+void set_flown(const FlownByMultipliers& f, size_t first, size_t last, const std::vector<Stiffening>& stiffening,
+               Run& r) {
+  r.motion.time.clear(), r.motion.y.clear(), r.motion.balance.clear();
+  for (size_t row = first; row < last; ++row) {
+    r.motion.time.push_back(f.flight.time[row]);
+    r.motion.y.push_back(f.y(row));
+    r.motion.balance.push_back(balance_of(f.tree, f.flight, row, r.motion.y.back()));
+  }
+  r.outputs = output_table(f.scene, f.tree, last - first, [&](size_t i) {
+    const size_t row = first + i;
+    return Moment{f.flight.time[row], f.states[row], joint_loads(f.system, f.flight.states[row]), r.motion.balance[i]};
+  });
+  r.motion.warnings = warnings_of(f.scene, f.system.multibody(), f.flight, r.motion.stiffening_effect, stiffening);
+  const MultibodyState& last_state = f.flight.states.back();
+  const Balance at_end = balance_of(f.tree, f.flight, f.states.size() - 1, f.y(f.states.size() - 1));
+  r.ledger = EnergyOfRun{at_end.kinetic, at_end.potential, at_end.work, last_state.ledger};
+  r.motion.events = f.flight.events;
+  r.motion.summary = summary_of(f.flight.summary);
+  r.end = end_of(r, f.scene, f.flight.time.back(), f.y(f.states.size() - 1), r.motion.summary);
+  for (size_t i = 0; i < f.scene.joints.size(); ++i)
+    if (f.scene.joints[i].closes_loop && f.scene.joints[i].kind == JointKind::hinge)
+      r.end.loops[f.scene.joints[i].name] = f.states.back().joints[i].coordinate[0];
+}
+
+}  // namespace
+
+Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
+  const Stopwatch start;
+  Multibody all = make_multibody(scene, bodies);
+  const Scene open = without_loops(scene);
+  const Multibody opened = make_multibody(open, bodies);
+  std::vector<Stiffening> stiffening = first_stiffening(open, opened);
+  Run r;
+  r.bodies = std::move(bodies);
+  IntegratorOptions options = integrator_options(scene, hooks, "ida", max_steps);
+  set_corners(scene, options);
+  if (scene.from) options.stops = scene.from->stops(joint_names(scene));
+  r.prepare_seconds = start.seconds();
+
+  const Stopwatch flight_time;
+  std::unique_ptr<const Multipliers> system;
+  TreeState asked;
+  MultibodyTrajectory flight;
+  std::vector<TreeState> states;
+  size_t told = 0;
+  std::vector<LargestStiffening> effect;  // of the flight so far
+  Checkpoint<MultibodyTrajectory> checkpoint;
+  if (hooks.checkpoint)
+    checkpoint = [&](const MultibodyTrajectory& so_far, size_t outputs) {
+      effect = largest_stiffening(*system, so_far);
+      if (will_be_revised(scene, opened, effect, stiffening)) return;
+      add_states(*system, so_far, states);
+      Run part = r;
+      part.motion.stiffening_effect = effect;
+      set_flown({scene, *system, *r.tree, so_far, states}, told, outputs, stiffening, part);
+      states.resize(outputs);
+      part.integrate_seconds = flight_time.seconds();
+      hooks.checkpoint(std::move(part), std::exchange(told, outputs));
+    };
+  const auto fly = [&] {
+    states.clear(), told = 0;
+    r.tree = std::make_shared<const Tree>(opened, stiffening);
+    VectorXd y0 = first_state(open, *r.tree);
+    r.tree->impose(options.start, y0);
+    asked = r.tree->unpack(y0);
+    for (size_t i = 0; i < all.wheels.size(); ++i) all.wheels[i].spin = asked.spin[i];
+    system = std::make_unique<const Multipliers>(all, stiffening);
+    const std::vector<BodyState> closed = close_joints(*system, body_states(*r.tree, options.start, y0), options.start);
+    MultipliersOptions of_flight =
+        multipliers_options(options, start_angles(system->multibody(), asked, scene.from.get()));
+    set_energies(of_flight, all, r.tree->layout(), y0);
+    flight = integrate_multipliers(*system, closed, of_flight, checkpoint);
+    effect = largest_stiffening(*system, flight);
+    return flight.summary.interrupted;
+  };
+  fly_until_settled(scene, opened, effect, stiffening, fly);
+  r.motion.stiffening_effect = effect;
+  add_states(*system, flight, states);
+  set_flown({scene, *system, *r.tree, flight, states}, 0, states.size(), stiffening, r);
+  note_moved_starts(scene, asked, states.front(), r.notes);
+  r.integrate_seconds = flight_time.seconds();
+  return r;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,307 @@
+#include "apps/simulate/simulate.hpp"
+
+#include "apps/base/deflection.hpp"
+#include "apps/simulate/error_budget.hpp"
+#include "apps/simulate/multipliers_flight.hpp"
+#include "apps/simulate/tree_flight.hpp"
+#include "dynamics/numerics/rotation.hpp"
+#include "fem/base/check.hpp"
+#include "fem/base/stopwatch.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+/// "sip.q2" -> "sip.q", "hub.rotation.x" -> "hub.rotation", "sip.angle" -> "sip.angle".
+std::string output_of_column(const std::string& column) {
+  const auto dot = column.rfind('.');
+  if (dot == std::string::npos) return column;
+  const std::string last = column.substr(dot + 1);
+  if (last == "x" || last == "y" || last == "z") return column.substr(0, dot);
+  if (last.size() > 1 && last[0] == 'q' && std::isdigit(static_cast<unsigned char>(last[1])))
+    return column.substr(0, dot) + ".q";
+  return column;
+}
+
+bool is_wanted(const std::string& output, const std::vector<std::string>& wanted) {
+  if (output == "t" || output.starts_with("energy.") || output.starts_with("lvlh.")) return false;
+  return wanted.empty() || std::find(wanted.begin(), wanted.end(), output) != wanted.end();
+}
+
+/// Angle of the rotation that leads from one rotation vector to another: their difference jumps where the angle passes
+/// pi.
+double angle_between(const Vector3d& a, const Vector3d& b) {
+  return rotation_vector(quaternion_product(quaternion_of(-a), quaternion_of(b))).norm();
+}
+
+}  // namespace
+
+std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
+                                              const std::vector<std::string>& wanted) {
+  const Eigen::Index rows = std::min(a.values.rows(), b.values.rows());
+  std::vector<std::string> order;
+  std::map<std::string, std::vector<std::pair<Eigen::Index, Eigen::Index>>> columns;
+  for (size_t i = 0; i < a.names.size(); ++i) {
+    const auto j = std::find(b.names.begin(), b.names.end(), a.names[i]);
+    const std::string output = output_of_column(a.names[i]);
+    if (j == b.names.end() || !is_wanted(output, wanted)) continue;
+    if (!columns.contains(output)) order.push_back(output);
+    columns[output].emplace_back(static_cast<Eigen::Index>(i), j - b.names.begin());
+  }
+  std::vector<OutputDifference> result;
+  for (const std::string& output : order) {
+    double difference = 0, size = 0;
+    for (Eigen::Index row = 0; row < rows; ++row) {
+      VectorXd u(columns[output].size()), v(columns[output].size());
+      for (size_t k = 0; k < columns[output].size(); ++k) {
+        u[static_cast<Eigen::Index>(k)] = a.values(row, columns[output][k].first);
+        v[static_cast<Eigen::Index>(k)] = b.values(row, columns[output][k].second);
+      }
+      difference = std::max(difference, output.ends_with(".rotation") ? angle_between(u, v) : (u - v).norm());
+      size = std::max(size, v.norm());
+    }
+    result.push_back({output, size > 0 ? difference / size : difference});
+  }
+  return result;
+}
+
+double largest(const std::vector<OutputDifference>& differences) {
+  double r = 0;
+  for (const OutputDifference& d : differences) r = std::max(r, d.error);
+  return r;
+}
+
+IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, std::string_view chosen,
+                                     long max_steps) {
+  IntegratorOptions o;
+  o.method = scene.integrator == "auto" ? chosen : scene.integrator;
+  o.tolerance = scene.tolerance;
+  if (scene.from) o.start = scene.from->time(), o.largest = scene.from->largest();
+  o.duration = scene.duration;
+  o.output_step = scene.output_step;
+  o.settle = scene.settle;
+  o.rescale_at_events = scene.rescale_at_events;
+  o.interrupt = hooks.interrupt;
+  o.progress = hooks.progress;
+  o.checkpoint_every = hooks.checkpoint_every;
+  if (max_steps > 0) o.max_steps = max_steps;
+  return o;
+}
+
+FlightState end_of(const std::vector<PreparedBody>& bodies, double time, const VectorXd& y,
+                   const MotionScales& largest) {
+  FlightState end;
+  end.time = time;
+  end.y = y;
+  end.largest = largest;
+  for (const PreparedBody& p : bodies) end.modes[p.body.name] = p.modes;
+  return end;
+}
+
+namespace {
+
+/// Does a body whose model leaves geometric stiffness out turn so fast that it may be as large as its own?
+bool spins_fast(const Run& run, size_t body) {
+  constexpr double fast = 0.3;  // (Omega / omega_1)^2
+  const ReducedBody& b = run.bodies[body].body;
+  return b.n() > 0 && std::pow(largest_rate(run, body), 2) * b.Me(0, 0) > fast * b.Ke(0, 0);
+}
+
+/// Where geometric stiffness is left out of the model and may matter its size is looked at.
+std::vector<std::string> softening_warnings(Scene scene, const Run& run) {
+  std::vector<PreparedBody> bodies = run.bodies;
+  bool any = false;
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    BodyScene& b = scene.bodies[i];
+    if (!b.stiffening.empty() || !b.is_boom() || b.structure == "eq14" || !spins_fast(run, i)) continue;
+    b.stiffening = "on", any = true;
+    bodies[i] = prepare_body(b, 0, scene.bodies_kept_in);
+  }
+  if (!any) return {};
+  const Multibody multibody = make_multibody(scene, bodies);
+  return stiffening_warnings(multibody, largest_stiffening(Tree(multibody), run.motion), scene.tolerance,
+                             [](int) { return Stiffening::off; });
+}
+
+/// Over the outputs, of long lists over some.
+std::vector<Bending> bending_of(const Run& run) {
+  std::vector<Bending> bending;
+  const Eigen::Index stride = run.outputs.values.rows() / 20000 + 1;
+  for (const PreparedBody& p : run.bodies) {
+    Bending& most = bending.emplace_back();
+    if (p.body.n() == 0) continue;
+    const Deflection deflection(p.body);
+    const auto first = std::ranges::find(run.outputs.names, p.body.name + ".q1") - run.outputs.names.begin();
+    for (Eigen::Index row = 0; row < run.outputs.values.rows(); row += stride) {
+      const double size = deflection.largest(run.outputs.values.row(row).segment(first, p.body.n()).transpose());
+      if (size > most.size) most = {size, size / deflection.length(), run.outputs.values(row, 0)};
+    }
+  }
+  return bending;
+}
+
+}  // namespace
+
+double largest_rate(const Run& run, size_t body) {
+  double most = 0;
+  const size_t stride = run.motion.y.size() / 500 + 1;
+  for (size_t row = 0; row < run.motion.y.size(); row += stride)
+    most = std::max(
+        most,
+        run.tree->motion(run.motion.time[row], run.motion.y[row], Place{.body = static_cast<int>(body), .marker = {}})
+            .omega.norm());
+  return most;
+}
+
+Run run_once(const Scene& given, const RunHooks& hooks, int refine, long max_steps) {
+  const Stopwatch start;
+  const Scene scene = with_joints(given);
+  std::vector<PreparedBody> bodies;
+  for (const BodyScene& b : scene.bodies) bodies.push_back(prepare_body(b, refine, scene.bodies_kept_in));
+  const double seconds = start.seconds();
+  const auto fly = scene.formulation == "multipliers" ? fly_by_multipliers : fly_tree;
+  Run r = fly(scene, std::move(bodies), hooks, max_steps);
+  r.prepare_seconds += seconds;
+  r.bending = bending_of(r);
+  return r;
+}
+
+namespace {
+
+std::string damping_text(const DampingRule& d) {
+  if (d.name == "none") return "no structural damping";
+  if (d.name == "rayleigh")
+    return fmt::format("structural damping 'rayleigh', alpha {:g} 1/s, beta {:g} s", d.alpha, d.beta);
+  return fmt::format("structural damping '{}', value {:g}", d.name, d.value);
+}
+
+std::string why_method(const Scene& scene, const IntegrationSummary& s) {
+  if (scene.integrator != "auto") return "as asked";
+  return s.why_method.empty() ? "chosen" : "chosen: " + s.why_method;
+}
+
+void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan) {
+  for (size_t i = 0; i < run.bodies.size(); ++i) {
+    const BodyScene& b = scene.bodies[i];
+    if (!b.is_boom()) continue;
+    const PreparedBody& p = run.bodies[i];
+    const std::string model =
+        !p.kept.empty() && p.elements == 0 ? fmt::format("{} unknowns, kept in {}", p.dofs, p.kept.string())
+        : p.body.structure == "eq14"       ? "eq. 14, Euler-Bernoulli line mass, closed form"
+        : b.structure == "solid"
+            ? fmt::format("{} solid elements, {} unknowns", p.elements, p.dofs)
+            : fmt::format("{} beam elements, order {}, {} unknowns", p.elements, b.geometry.order, p.dofs);
+    plan.push_back(fmt::format("{}: {}; {} modes", b.name, model, p.body.n()));
+    plan.push_back(fmt::format("{}: {}", b.name, damping_text(b.damping)));
+  }
+  for (const JointScene& j : scene.joints)
+    if (j.mechanism.stop_stiffness > 0)
+      plan.push_back(fmt::format("stop of {0}: {1:g} {2}/{3} without damping of its own; damping {4:g} {2} s/{3}",
+                                 j.name, j.mechanism.stop_stiffness, j.kind == JointKind::slider ? "N" : "N m",
+                                 j.kind == JointKind::slider ? "m" : "rad", j.mechanism.damping));
+  plan.push_back(
+      fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
+                  run.motion.summary.method, why_method(scene, run.motion.summary), scene.tolerance));
+  plan.emplace_back(scene.formulation == "multipliers" ? "formulation: redundant coordinates, joints by multipliers"
+                                                       : "formulation: relative coordinates");
+  describe_model(scene, run, plan);
+  if (scene.orbit)
+    plan.push_back(fmt::format("orbit: rate {:.6e} rad/s{}; differential gravity {}, {:.1e} 1/s^2", scene.orbit->rate(),
+                               scene.orbit->J2 ? ", with J2" : "",
+                               scene.orbit->gravity == "none" ? "left out" : "on every body",
+                               3 * std::pow(scene.orbit->rate(), 2)));
+}
+
+/// What a user must not overlook.
+void add_warnings(const Run& run, RunResult& r) {
+  constexpr double small = 0.1;  // of its length: beyond, shapes are no longer those of a straight body
+  for (size_t i = 0; i < run.bending.size(); ++i)
+    if (const Bending& b = run.bending[i]; b.of_length > small)
+      r.warnings.push_back(
+          fmt::format("body {}: it bends by {:.3g} m at t = {:.6g} s, {:.0f} % of its length: the theory "
+                      "of small deflections no longer holds",
+                      run.bodies[i].body.name, b.size, b.time, 100 * b.of_length));
+  for (const std::vector<std::string>& more : {run.motion.warnings, softening_warnings(with_joints(r.scene), run)})
+    r.warnings.insert(r.warnings.end(), more.begin(), more.end());
+  if (!r.budget.measured || r.budget.within(r.scene.tolerance)) return;
+  const std::string why = r.budget.missing.empty() ? fmt::format("the errors add up to {:.1e}", r.budget.total())
+                                                   : fmt::format("{}", fmt::join(r.budget.missing, "; "));
+  r.warnings.push_back(
+      fmt::format("the accuracy wanted, {:.1e}, was not reached or not proven: {}", r.scene.tolerance, why));
+}
+
+/// What was flown and what is odd about it.
+void add_words(const Run& run, RunResult& r) {
+  if (r.scene.from)
+    r.plan.push_back(fmt::format("start: goes on from {} at t = {:g} s; counts and errors are those since then",
+                                 r.scene.from->file().string(), r.scene.from->time()));
+  describe(with_joints(r.scene), run, r.plan);
+  r.warnings = r.scene.warnings;
+}
+
+void take(Run run, RunResult& r) {
+  r.bodies = std::move(run.bodies);
+  r.tree = std::move(run.tree);
+  r.trajectory = std::move(run.motion);
+  r.outputs = std::move(run.outputs);
+  r.end = std::move(run.end);
+  r.ledger = run.ledger;
+  r.prepare_seconds = run.prepare_seconds;
+  r.integrate_seconds = run.integrate_seconds;
+}
+
+}  // namespace
+
+bool is_balanced(const IntegrationSummary& s) {
+  constexpr double broken = 0.01;  // far above any tolerance that is accepted for a step
+  return s.energy_balance <= broken && !(s.momentum_drift > broken);  // which may be unknown
+}
+
+RunResult run_scene(const Scene& given, const RunHooks& hooks,
+                    const std::function<void(const RunResult& so_far, size_t first)>& so_far) {
+  RunResult r;
+  r.scene = given;
+  validate(r.scene);
+  choose_modes(r.scene, hooks, r.plan);
+  RunHooks of_run = hooks;
+  if (so_far)
+    of_run.checkpoint = [&](Run run, size_t first) {
+      RunResult part = r;
+      add_words(run, part);
+      part.warnings.insert(part.warnings.end(), run.motion.warnings.begin(), run.motion.warnings.end());
+      take(std::move(run), part);
+      part.trajectory.summary.interrupted = false;  // not yet
+      so_far(part, first);
+    };
+  Run run = run_once(r.scene, of_run);
+  add_words(run, r);
+  // The repeats cost many times the run; a long one is not repeated.
+  constexpr long worth_repeating = 2'000'000;
+  const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating;
+  if (r.scene.error_budget && !repeat)
+    r.plan.push_back(fmt::format("error budget: not measured, its repeats would cost many times {} evaluations",
+                                 run.motion.summary.rhs_evaluations));
+  if (r.scene.error_budget && repeat && !run.motion.summary.interrupted) {
+    const Stopwatch start;
+    r.budget = measure_budget(r.scene, run, hooks, r.plan);
+    r.budget_seconds = start.seconds();
+  }
+  add_warnings(run, r);
+  take(std::move(run), r);
+  return r;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,139 @@
+#pragma once
+
+#include "apps/model/prepared_body.hpp"
+#include "apps/scene/scene.hpp"
+#include "apps/simulate/flight_state.hpp"
+#include "dynamics/methods/integrator.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+namespace flexboom {
+
+/// Four separate errors of a run, each relative to the outputs wanted (README of apps: what each is compared with).
+/// What was not measured is unknown (NaN), and then so is the total.
+struct ErrorBudget {
+  double discretisation = unknown;
+  double truncation = unknown;
+  double time = unknown;
+  double linearisation = unknown;
+  std::vector<std::string> missing;  // which part was not measured and why, one line each
+  bool measured = false;             // false: the repeats were not run, or not to their end
+  double total() const { return discretisation + truncation + time + linearisation; }
+  bool within(double tolerance) const { return total() <= tolerance; }
+};
+
+/// Names and values of the outputs of a run, one row per time: the columns of trajectory.csv.
+struct OutputTable {
+  std::vector<std::string> names;
+  Eigen::MatrixXd values;  // rows: times
+};
+
+/// Energies at the end of a run, by where they are and where they went [J].
+struct EnergyOfRun {
+  double kinetic = 0, potential = 0;  // potential: of gravity
+  double work = 0;
+  EnergyLedger ledger;
+};
+
+struct RunResult {
+  Scene scene;
+  std::vector<PreparedBody> bodies;  // as with_joints has them
+  TreeTrajectory trajectory;
+  std::shared_ptr<const Tree> tree;  // of the joints that close no loop
+  OutputTable outputs;
+  FlightState end;                    // from which another run can go on
+  std::optional<EnergyOfRun> ledger;  // of a scene with joints
+  ErrorBudget budget;
+  std::vector<std::string> plan;  // what was chosen and why, one line each
+  std::vector<std::string> warnings;
+  double prepare_seconds = 0;
+  double integrate_seconds = 0;  // of the run itself, without the repeats
+  double budget_seconds = 0;
+};
+
+struct Run;
+
+struct RunHooks {
+  const std::atomic<bool>* interrupt = nullptr;
+  std::function<void(double time, double duration)> progress{};
+  double checkpoint_every = 10;  // wall time between two checkpoints [s]
+  /// Told at every checkpoint of a flight: the run so far, whose rows begin with row `first` of the flight. Its end is
+  /// the state there. Row 0 comes again where the flight begins anew.
+  std::function<void(Run so_far, size_t first)> checkpoint{};
+};
+
+/// The whole chain. `so_far`: told of the run itself as RunHooks::checkpoint, not of its repeats.
+/// @throws InputError, NumericalError.
+RunResult run_scene(const Scene&, const RunHooks&,
+                    const std::function<void(const RunResult& so_far, size_t first)>& so_far = {});
+
+/// Do energy and momenta balance as well as any run must? If not, the motion is wrong whatever the tolerance was.
+bool is_balanced(const IntegrationSummary&);
+
+/// How far a body bends in a flight: the largest elastic displacement of any of its points.
+struct Bending {
+  double size = 0;       // [m]
+  double of_length = 0;  // by the length of the body
+  double time = 0;       // [s]
+};
+
+/// One flight of a scene as it stands.
+struct Run {
+  std::vector<PreparedBody> bodies;  // as with_joints has them
+  TreeTrajectory motion;             // by whatever coordinates: the states are those of `tree`
+  OutputTable outputs;
+  FlightState end;
+  std::vector<Bending> bending;  // per body
+  std::optional<EnergyOfRun> ledger;
+  double prepare_seconds = 0, integrate_seconds = 0;
+
+  std::shared_ptr<const Tree> tree;  // of the joints that close no loop
+  std::vector<std::string> notes;    // for the plan
+};
+/// What a scene asks of an integrator; `chosen`: the method where it leaves the choice. `max_steps` as of run_once.
+IntegratorOptions integrator_options(const Scene&, const RunHooks&, std::string_view chosen, long max_steps);
+
+/// The largest angular velocity of a body's frame in a flight [rad/s].
+double largest_rate(const Run&, size_t body);
+
+/// `max_steps` > 0 bounds its cost: NumericalError above.
+Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
+
+/// Time, numbers and modes at the end of a flight; names and stops are for the caller.
+FlightState end_of(const std::vector<PreparedBody>&, double time, const Eigen::VectorXd& y,
+                   const MotionScales& largest);
+
+/// Of a flight on its way: its events and summary, and the rows from `first` on that come before `last`.
+template <class Flight>
+Flight rows_of(const Flight& f, size_t first, size_t last) {
+  const auto part = [&](const auto& rows) {
+    return std::decay_t<decltype(rows)>(rows.begin() + static_cast<std::ptrdiff_t>(first),
+                                        rows.begin() + static_cast<std::ptrdiff_t>(last));
+  };
+  Flight r;
+  r.time = part(f.time), r.y = part(f.y), r.balance = part(f.balance);
+  r.events = f.events, r.summary = f.summary;
+  return r;
+}
+
+/// Largest relative difference over the wanted outputs that both tables have (all when `wanted` is empty): for each
+/// output, a vector counting as one, max over time of |a - b| over max |b|.
+struct OutputDifference {
+  std::string name;
+  double error = 0;
+};
+std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
+                                              const std::vector<std::string>& wanted);
+
+/// The largest of them.
+double largest(const std::vector<OutputDifference>&);
+
+}  // namespace flexboom

@@ -1,0 +1,363 @@
+// Flights in relative coordinates: from the scene to a tree, and how it flies.
+
+#include "apps/simulate/tree_flight.hpp"
+
+#include "apps/scene/scene_keys.hpp"
+#include "apps/scene/scene_orbit.hpp"
+#include "fem/base/check.hpp"
+#include "fem/base/stopwatch.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+int index_of(const Scene& scene, const std::string& body) {
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].name == body) return static_cast<int>(i);
+  throw InputError(fmt::format("there is no body \"{}\"", body));
+}
+
+Place place_of(const Scene& scene, const PlaceScene& p) {
+  Place place{.body = -1, .marker = p.marker, .position = p.point, .axes = p.axes()};
+  if (p.body.empty()) return place;
+  place.body = index_of(scene, p.body);
+  if (scene.bodies[static_cast<size_t>(place.body)].structure == "eq14" && p.marker == "root") place.marker.clear();
+  return place;
+}
+
+/// A function of time of the scene, whose values must be numbers whenever an integrator asks. `of` says whose it is.
+std::function<double(double)> finite(std::function<double(double)> f, std::string of) {
+  return [f = std::move(f), of = std::move(of)](double t) {
+    const double value = f(t);
+    if (!std::isfinite(value))
+      throw NumericalError(
+          fmt::format("{} is {} at t = {:.9g} s: its function of time has no value there", of, value, t));
+    return value;
+  };
+}
+
+std::function<double(double)> function_of(const Scene& scene, const CourseScene& course, const std::string& of) {
+  return finite(course_of(course, scene.duration).function.value, of);
+}
+
+std::function<double(double)> negative(const std::function<double(double)>& f) {
+  return [f](double t) { return -f(t); };
+}
+
+/// The drive of a hinge or a slider: along z of both places, opposite on a.
+void add_drive(const Scene& scene, const JointScene& j, Multibody& r) {
+  const std::function<double(double)> f = function_of(scene, j.drive, fmt::format("joint {}: drive", j.name));
+  for (const bool on_b : {true, false}) {
+    const PlaceScene& at = on_b ? j.b : j.a;
+    if (at.body.empty()) continue;
+    Load load;
+    load.name = "drive of " + j.name;
+    load.at = place_of(scene, at);
+    (j.kind == JointKind::hinge ? load.torque : load.force)[2] = on_b ? f : negative(f);
+    r.loads.push_back(std::move(load));
+  }
+}
+
+Joint joint_of(const Scene& scene, const JointScene& j) {
+  Joint joint;
+  joint.name = j.name;
+  joint.kind = j.kind;
+  joint.a = place_of(scene, j.a);
+  joint.b = place_of(scene, j.b);
+  joint.mechanism = j.mechanism, joint.law = j.law;
+  joint.closes_loop = j.closes_loop;
+  for (const CourseScene& c : j.motion) {
+    const TimeFunction f = course_of(c, scene.duration).function;
+    const std::string of = fmt::format("joint {}: motion", j.name);
+    joint.prescribed.push_back(
+        {finite(f.value, of), finite(f.rate, of + ", its rate,"), finite(f.acceleration, of + ", its acceleration,")});
+  }
+  return joint;
+}
+
+Load load_of(const Scene& scene, const LoadScene& l) {
+  Load load;
+  load.name = l.name;
+  load.at = place_of(scene, l.at);
+  load.inertial_axes = l.inertial_axes;
+  const auto function = [&](const CourseScene& c, const char* what, size_t i) {
+    return c.given() ? function_of(scene, c, fmt::format("load {}: {}[{}]", l.name, what, i)) : nullptr;
+  };
+  for (size_t i = 0; i < 3; ++i) {
+    load.force[i] = function(l.force[i], "force", i);
+    load.torque[i] = function(l.torque[i], "torque", i);
+  }
+  return load;
+}
+
+ReactionWheel wheel_of(const Scene& scene, const WheelScene& w) {
+  ReactionWheel wheel;
+  wheel.name = w.name;
+  wheel.body = index_of(scene, w.body);
+  wheel.axis = w.axis;
+  wheel.inertia = w.inertia;
+  wheel.spin = w.spin;
+  wheel.torque = [](double) { return 0.0; };
+  if (w.torque.given()) wheel.torque = function_of(scene, w.torque, fmt::format("wheel {}: torque", w.name));
+  return wheel;
+}
+
+/// Inertia of all bodies about their mass centre at the start, axes of `body`, less what the rotors have about their
+/// own axes [kg m^2]: the angular momentum of unit rates.
+Matrix3d inertia_at_start(const Scene& scene, const Tree& tree, int body) {
+  TreeState s = start_state(scene, tree);
+  Place place;
+  place.body = body;
+  const Matrix3d attitude = tree.motion(0, tree.pack(s), place).axes;
+  const auto carrier = std::ranges::find(scene.joints, scene.bodies[static_cast<size_t>(body)].name,
+                                         [](const JointScene& j) { return j.b.body; });
+  JointState& joint = s.joints[static_cast<size_t>(carrier - scene.joints.begin())];
+  Matrix3d J;
+  for (int i = 0; i < 3; ++i) {
+    joint.omega = carrier->b.axes().row(i);
+    J.col(i) = attitude.transpose() * tree.balance(0, tree.pack(s)).angular_momentum;
+  }
+  for (const ReactionWheel& w : tree.scene().wheels)
+    if (w.body == body) J -= w.inertia * w.axis * w.axis.transpose();
+  return (J + J.transpose()) / 2;
+}
+
+/// Gives the three free wheels of the turning body the torques of the turns.
+void add_turns(const Scene& scene, Multibody& r) {
+  if (scene.turns.empty()) return;
+  const int body = index_of(scene, scene.turns.front().body);
+  Matrix3d axes;
+  std::vector<ReactionWheel*> wheels;
+  for (size_t i = 0; i < r.wheels.size(); ++i) {
+    if (r.wheels[i].body != body || scene.wheels[i].torque.given()) continue;
+    axes.col(std::ssize(wheels)) = r.wheels[i].axis;
+    wheels.push_back(&r.wheels[i]);
+  }
+  const Matrix3d J = inertia_at_start(scene, Tree(r), body), share = axes.inverse();
+  const auto torque = std::make_shared<const WheelTorques>(wheel_torques(J, turns_of(scene.turns)));
+  for (size_t i = 0; i < wheels.size(); ++i) {
+    wheels[i]->torque = [torque, row = Eigen::RowVector3d(share.row(static_cast<Eigen::Index>(i)))](double t) {
+      double sum = 0;
+      for (int k = 0; k < 3; ++k) sum += row[k] * torque->torque[static_cast<size_t>(k)].function.value(t);
+      return sum;
+    };
+  }
+}
+
+}  // namespace
+
+Multibody make_multibody(const Scene& scene, const std::vector<PreparedBody>& bodies) {
+  Multibody r;
+  r.gravity = scene.gravity;
+  r.field = field_of(scene);
+  for (const PreparedBody& p : bodies) r.bodies.push_back(p.body);
+  for (const JointScene& j : scene.joints) {
+    r.joints.push_back(joint_of(scene, j));
+    if (j.drive.given()) add_drive(scene, j, r);
+  }
+  for (const SpringScene& s : scene.springs)
+    r.springs.push_back({s.name, place_of(scene, s.a), place_of(scene, s.b), s.stiffness, s.free_length, s.damping});
+  for (const LoadScene& l : scene.loads) r.loads.push_back(load_of(scene, l));
+  for (const WheelScene& w : scene.wheels) r.wheels.push_back(wheel_of(scene, w));
+  add_turns(scene, r);
+  return r;
+}
+
+Scene without_loops(Scene scene) {
+  std::erase_if(scene.joints, [](const JointScene& j) { return j.closes_loop; });
+  return scene;
+}
+
+TreeState start_state(const Scene& scene, const Tree& tree) {
+  TreeState s = tree.at_rest();
+  for (size_t i = 0; i < scene.joints.size(); ++i) {
+    const JointScene& j = scene.joints[i];
+    JointState& state = s.joints[i];
+    if (!j.start.empty()) state.coordinate = j.start;
+    if (!j.start_rate.empty()) state.rate = j.start_rate;
+    state.attitude = j.start_attitude.normalized();
+    state.omega = j.start_omega;
+    state.position = j.start_position;
+    state.velocity = j.start_velocity;
+  }
+  return s;
+}
+
+Vector3d mass_centre(const Tree& tree, const TreeState& state) {
+  const VectorXd y = tree.pack(state);
+  Vector3d moment = Vector3d::Zero();
+  double mass = 0;
+  for (size_t i = 0; i < tree.scene().bodies.size(); ++i) {
+    const ReducedBody& body = tree.scene().bodies[i];
+    const PlaceMotionInSpace origin = tree.motion(0, y, Place{.body = static_cast<int>(i), .marker = {}});
+    mass += body.m;
+    moment += body.m * origin.position + origin.axes * body.mc0;
+  }
+  return moment / mass;
+}
+
+VectorXd first_state(const Scene& scene, const Tree& tree) {
+  if (scene.from) return scene.from->values(state_names(tree));
+  TreeState start = start_state(scene, tree);
+  if (tree.scene().field) {  // the mass centre follows the orbit
+    const Vector3d centre = mass_centre(tree, start);
+    for (size_t i = 0; i < scene.joints.size(); ++i)
+      if (scene.joints[i].a.body.empty()) start.joints[i].position -= scene.joints[i].a.axes().transpose() * centre;
+  }
+  return tree.pack(start);
+}
+
+std::vector<std::string> joint_names(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const JointScene& j : scene.joints) names.push_back(j.name);
+  return names;
+}
+
+FlightState end_of(const Run& run, const Scene& scene, double time, const VectorXd& y,
+                   const IntegrationSummary& summary) {
+  const std::vector<StopHistory>& stops = summary.stops;
+  FlightState end = end_of(run.bodies, time, y, summary.largest);
+  end.names = state_names(*run.tree);
+  for (size_t i = 0; i < stops.size(); ++i)
+    if (scene.joints[i].mechanism.stop_stiffness > 0 || scene.joints[i].law.given())
+      end.stops[scene.joints[i].name] = stops[i];
+  return end;
+}
+
+void set_corners(const Scene& scene, IntegratorOptions& o) {
+  const auto add_corners = [&](const TimeCourse& c) {
+    for (const double t : c.corners)
+      if (t > 0 && t < scene.duration) o.corners.push_back(t);
+  };
+  const auto add = [&](const CourseScene& c) {
+    if (!c.given()) return;
+    add_corners(course_of(c, scene.duration));
+    o.step_to_outputs = o.step_to_outputs || !c.expression.empty();
+  };
+  for (const JointScene& j : scene.joints) {
+    add(j.drive);
+    for (const CourseScene& c : j.motion) add(c);
+  }
+  for (const LoadScene& l : scene.loads)
+    for (size_t i = 0; i < 3; ++i) add(l.force[i]), add(l.torque[i]);
+  for (const WheelScene& w : scene.wheels) add(w.torque);
+  for (const WheelTurn& t : turns_of(scene.turns)) add_corners(rest_to_rest(t.manoeuvre));
+  std::ranges::sort(o.corners);
+  o.corners.erase(std::unique(o.corners.begin(), o.corners.end()), o.corners.end());
+}
+
+namespace {
+
+bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty(); }
+
+EnergyOfRun ledger_of(const Balance& b) { return {b.kinetic, b.potential, b.work, b.ledger}; }
+
+/// What results are made of.
+void set_flown(const Scene& scene, TreeTrajectory flight, Run& r) {
+  r.outputs = output_table(scene, *r.tree, flight);
+  if (!flight.balance.empty()) r.ledger = ledger_of(flight.balance.back());
+  r.motion = std::move(flight);
+}
+
+}  // namespace
+
+std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& bodies) {
+  const Tree plain(bodies);
+  std::vector<Stiffening> choice =
+      stiffening_where_it_counts(bodies, plain.unpack(first_state(scene, plain)), scene.duration, scene.tolerance);
+  for (size_t i = 0; i < choice.size(); ++i) {
+    if (scene.bodies[i].stiffening == "on" && bodies.bodies[i].n() > 0) choice[i] = Stiffening::on;
+    if (scene.bodies[i].stiffening == "off" || !has_stiffening(bodies.bodies[i])) choice[i] = Stiffening::off;
+  }
+  return choice;
+}
+
+bool revise_stiffening(const Scene& scene, const Multibody& bodies, const std::vector<LargestStiffening>& effect,
+                       std::vector<Stiffening>& choice) {
+  bool changed = false;
+  for (size_t i = 0; i < choice.size(); ++i) {
+    const bool wanted =
+        scene.bodies[i].stiffening == "auto" && has_stiffening(bodies.bodies[i]) && effect[i].size > scene.tolerance;
+    if (!wanted || choice[i] == Stiffening::on) continue;
+    choice[i] = Stiffening::on;
+    changed = true;
+  }
+  return changed;
+}
+
+bool will_be_revised(const Scene& scene, const Multibody& bodies, const std::vector<LargestStiffening>& effect,
+                     std::vector<Stiffening> choice) {
+  return revise_stiffening(scene, bodies, effect, choice);
+}
+
+void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<LargestStiffening>& effect,
+                       std::vector<Stiffening>& choice, const std::function<bool()>& fly) {
+  for (bool again = true; again;) {
+    effect.assign(choice.size(), {});
+    try {
+      const bool interrupted = fly();
+      again = !interrupted && revise_stiffening(scene, bodies, effect, choice);
+    } catch (const NumericalError&) {
+      if (!revise_stiffening(scene, bodies, effect, choice)) throw;
+    }
+  }
+}
+
+Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
+  const Stopwatch start;
+  const Multibody multibody = make_multibody(scene, bodies);
+  std::vector<Stiffening> stiffening = first_stiffening(scene, multibody);
+  Run r;
+  r.bodies = std::move(bodies);
+  r.prepare_seconds = start.seconds();
+  const Stopwatch flight_time;
+  size_t told = 0;
+  std::vector<LargestStiffening> effect;  // of the flight so far
+  Checkpoint<TreeTrajectory> checkpoint;
+  if (hooks.checkpoint)
+    checkpoint = [&](const TreeTrajectory& so_far, size_t outputs) {
+      effect = so_far.stiffening_effect;
+      if (outputs < told) told = 0;  // another method has begun anew
+      if (will_be_revised(scene, multibody, effect, stiffening)) return;
+      Run part = r;
+      TreeTrajectory rows = rows_of(so_far, told, outputs);
+      if (!so_far.laws.empty())
+        rows.laws.assign(so_far.laws.begin() + static_cast<std::ptrdiff_t>(told),
+                         so_far.laws.begin() + static_cast<std::ptrdiff_t>(outputs));
+      rows.stiffening_effect = so_far.stiffening_effect, rows.warnings = so_far.warnings;
+      set_flown(scene, std::move(rows), part);
+      part.end = end_of(part, scene, so_far.time.back(), so_far.y.back(), so_far.summary);
+      part.integrate_seconds = flight_time.seconds();
+      hooks.checkpoint(std::move(part), std::exchange(told, outputs));
+    };
+  TreeTrajectory flight;
+  const auto fly = [&] {
+    told = 0;
+    r.tree = std::make_shared<const Tree>(multibody, stiffening);
+    IntegratorOptions options = integrator_options(scene, hooks, "auto", max_steps);
+    set_corners(scene, options);
+    if (scene.from) options.stops = scene.from->stops(joint_names(scene));
+    flight = integrate(*r.tree, first_state(scene, *r.tree), options, checkpoint);
+    effect = flight.stiffening_effect;
+    return flight.summary.interrupted;
+  };
+  fly_until_settled(scene, multibody, effect, stiffening, fly);
+  r.end = end_of(r, scene, flight.time.back(), flight.y.back(), flight.summary);
+  set_flown(scene, std::move(flight), r);
+  r.integrate_seconds = flight_time.seconds();
+  return r;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,72 @@
+#pragma once
+
+#include "apps/simulate/simulate.hpp"
+#include "dynamics/simulation/tree_integrator.hpp"
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// The bodies, joints and forces of a scene with joints. @throws InputError.
+Multibody make_multibody(const Scene&, const std::vector<PreparedBody>&);
+
+/// The joints that make the tree.
+Scene without_loops(Scene);
+
+/// Start values of its joints.
+TreeState start_state(const Scene&, const Tree&);
+
+/// Where its flight begins: there, or where an earlier run ended. @throws InputError for a state of another scene.
+Eigen::VectorXd first_state(const Scene&, const Tree&);
+
+std::vector<std::string> joint_names(const Scene&);
+
+/// Where a flight of a scene with joints is.
+FlightState end_of(const Run&, const Scene&, double time, const Eigen::VectorXd& y, const IntegrationSummary&);
+
+/// Geometric stiffness of each body: as the scene says, "auto" by what its start and prescribed motions make of it.
+std::vector<Stiffening> first_stiffening(const Scene&, const Multibody&);
+
+/// Turns on what a flight showed to count: `effect` per body. Was there any?
+bool revise_stiffening(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect,
+                       std::vector<Stiffening>&);
+
+/// Would that turn on any? Then the flight that showed it is not worth keeping.
+bool will_be_revised(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect,
+                     std::vector<Stiffening>);
+
+/// Flies until no flight shows more that counts; one that fails without it is flown again with it. `fly` sets `effect`
+/// and says whether it was interrupted. @throws NumericalError as `fly`.
+void fly_until_settled(const Scene&, const Multibody&, std::vector<LargestStiffening>& effect, std::vector<Stiffening>&,
+                       const std::function<bool()>& fly);
+
+/// One flight in relative coordinates. Geometric stiffness "auto" is on
+/// where it exceeds the tolerance at the start, under the prescribed motions, or (then the flight is repeated with it)
+/// at any output. `max_steps` > 0 bounds its cost. @throws InputError, NumericalError.
+Run fly_tree(const Scene&, std::vector<PreparedBody>, const RunHooks&, long max_steps);
+
+/// Adds where the scene's functions of time are not smooth. Those of an expression are not known: no step passes an
+/// output then, so that a pulse is not stepped over.
+void set_corners(const Scene&, IntegratorOptions&);
+
+/// Where the mass centre of all bodies lies, inertial axes [m].
+Eigen::Vector3d mass_centre(const Tree&, const TreeState&);
+
+/// What a row of trajectory.csv is made of.
+struct Moment {
+  double time = 0;
+  TreeState state;               // joints as Scene::joints
+  std::vector<JointLoad> loads;  // the same
+  Balance balance;
+};
+
+/// Columns of trajectory.csv. The rows are asked for one after the other.
+OutputTable output_table(const Scene&, const Tree&, size_t rows, const std::function<Moment(size_t)>& moment);
+OutputTable output_table(const Scene&, const Tree&, const TreeTrajectory&);
+
+/// What was flown, one line each.
+void describe_model(const Scene&, const Run&, std::vector<std::string>& plan);
+
+}  // namespace flexboom

@@ -1,0 +1,204 @@
+// Outputs of a scene: columns of trajectory.csv, lines of the plan.
+
+#include "apps/base/deflection.hpp"
+#include "apps/scene/scene_orbit.hpp"
+#include "apps/simulate/tree_flight.hpp"
+#include "dynamics/numerics/rotation.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <optional>
+
+namespace flexboom {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Puts values under their names, row by row: the first row says what the columns are.
+class Columns {
+ public:
+  Columns(OutputTable& table, Eigen::Index rows) : table_(table), rows_(rows) {}
+
+  void put(const std::string& name, double value) {
+    if (row_ == 0) {
+      table_.names.push_back(name);
+      table_.values.conservativeResize(rows_, static_cast<Eigen::Index>(table_.names.size()));
+    }
+    table_.values(row_, column_++) = value;
+  }
+  void put(const std::string& name, const Vector3d& v) {
+    put(name + ".x", v.x()), put(name + ".y", v.y()), put(name + ".z", v.z());
+  }
+  void end_row() { ++row_, column_ = 0; }
+
+ private:
+  OutputTable& table_;
+  Eigen::Index rows_, row_ = 0, column_ = 0;
+};
+
+/// `centre`: where the scene has the mass centre, which flies along the orbit.
+void put_joint(Columns& out, const JointScene& joint, const JointState& s, const Vector3d& centre) {
+  const std::string& name = joint.name;
+  switch (joint.kind) {
+    case JointKind::fixed:
+      return;
+    case JointKind::hinge:
+      return out.put(name + ".angle", s.coordinate[0]), out.put(name + ".rate", s.rate[0]);
+    case JointKind::slider:
+      return out.put(name + ".length", s.coordinate[0]), out.put(name + ".rate", s.rate[0]);
+    case JointKind::universal:
+      out.put(name + ".angle1", s.coordinate[0]), out.put(name + ".angle2", s.coordinate[1]);
+      return out.put(name + ".rate1", s.rate[0]), out.put(name + ".rate2", s.rate[1]);
+    case JointKind::spherical:
+    case JointKind::free:
+      out.put(name + ".rotation", rotation_vector(s.attitude)), out.put(name + ".rate", s.omega);
+  }
+  if (joint.kind != JointKind::free) return;
+  Vector3d position = s.position;
+  if (joint.a.body.empty()) position += joint.a.axes().transpose() * centre;
+  out.put(name + ".position", position), out.put(name + ".velocity", s.velocity);
+}
+
+void put_body(Columns& out, const Tree& tree, size_t number, const VectorXd& q) {
+  const ReducedBody& body = tree.scene().bodies[number];
+  for (Eigen::Index k = 0; k < q.size(); ++k) out.put(fmt::format("{}.q{}", body.name, k + 1), q[k]);
+  if (const Marker* tip = body.n() > 0 ? tip_of(body) : nullptr)
+    out.put(body.name + ".tip", displacement(body, *tip, q, tree.stiffening(static_cast<int>(number))));
+}
+
+void put_load(Columns& out, const JointScene& joint, const JointLoad& load) {
+  out.put(joint.name + ".force", load.force), out.put(joint.name + ".torque", load.torque);
+  if (load.drive.size() == 1) out.put(joint.name + ".drive", load.drive[0]);
+  for (size_t i = 1; load.drive.size() > 1 && i <= load.drive.size(); ++i)
+    out.put(fmt::format("{}.drive{}", joint.name, i), load.drive[i - 1]);
+}
+
+/// The joint of the body whose attitude against the LVLH frame is an output.
+size_t first_that_flies(const Scene& scene) {
+  const auto flies = [](const JointScene& j) { return j.kind == JointKind::free && j.a.body.empty(); };
+  return static_cast<size_t>(std::ranges::find_if(scene.joints, flies) - scene.joints.begin());
+}
+
+/// Of the body on a free joint, BRF -> inertial.
+Eigen::Vector4d attitude_of(const JointScene& joint, const JointState& s) {
+  const Eigen::Quaterniond turn(
+      Eigen::Matrix3d(joint.a.axes() * rotation_matrix(s.attitude) * joint.b.axes().transpose()));
+  return {turn.w(), turn.x(), turn.y(), turn.z()};
+}
+
+/// Rotation vectors of the body that turns from the attitudes that the turns command, its own axes [rad].
+class Pointing {
+ public:
+  explicit Pointing(const Scene& scene) : turns_(turns_of(scene.turns)) {
+    if (turns_.empty()) return;
+    name_ = scene.turns.front().body;
+    const auto carrier = std::ranges::find(scene.joints, name_, [](const JointScene& j) { return j.b.body; });
+    joint_ = static_cast<size_t>(carrier - scene.joints.begin());
+    from_place_ = carrier->b.axes();
+    start_ = rotation_matrix(carrier->start_attitude);
+  }
+
+  void put(Columns& out, double t, const TreeState& s) const {
+    if (turns_.empty()) return;
+    const Eigen::Matrix3d now = start_.transpose() * rotation_matrix(s.joints[joint_].attitude);
+    const Eigen::Quaterniond error(Eigen::Matrix3d(rotation_matrix(commanded_attitude(turns_, t)).transpose() *
+                                                   from_place_ * now * from_place_.transpose()));
+    out.put(name_ + ".pointing", rotation_vector({error.w(), error.x(), error.y(), error.z()}));
+  }
+
+ private:
+  std::vector<WheelTurn> turns_;
+  std::string name_;
+  size_t joint_ = 0;
+  Eigen::Matrix3d from_place_, start_;  // place b -> body; place b -> place a at the start
+};
+
+}  // namespace
+
+OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
+                         const std::function<Moment(size_t)>& moment) {
+  OutputTable table;
+  Columns out(table, static_cast<Eigen::Index>(rows));
+  const Pointing pointing(scene);
+  Vector3d centre = Vector3d::Zero();
+  if (tree.scene().field) centre = mass_centre(tree, start_state(without_loops(scene), tree));
+  const size_t flying = first_that_flies(scene);
+  std::optional<Orbit> orbit;
+  if (scene.orbit && flying < scene.joints.size()) orbit = orbit_of(scene);
+  for (size_t row = 0; row < rows; ++row) {
+    const Moment now = moment(row);
+    const TreeState& s = now.state;
+    out.put("t", now.time);
+    for (size_t i = 0; i < scene.joints.size(); ++i) {
+      put_joint(out, scene.joints[i], s.joints[i], centre);
+      if (scene.joints[i].loads) put_load(out, scene.joints[i], now.loads[i]);
+    }
+    for (size_t b = 0; b < scene.bodies.size(); ++b) put_body(out, tree, b, s.q[b]);
+    for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name + ".spin", s.spin[w]);
+    pointing.put(out, now.time, s);
+    if (orbit) {
+      const Vector3d angles = lvlh_angles(attitude_of(scene.joints[flying], s.joints[flying]), *orbit, now.time);
+      out.put("lvlh.roll", angles.x()), out.put("lvlh.pitch", angles.y()), out.put("lvlh.yaw", angles.z());
+    }
+    const Balance& e = now.balance;
+    out.put("energy.kinetic", e.kinetic), out.put("energy.elastic", e.elastic);
+    out.put("energy.potential", e.potential), out.put("energy.dissipated", e.dissipated);
+    out.put("energy.work", e.work);
+    out.end_row();
+  }
+  return table;
+}
+
+OutputTable output_table(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) {
+  const bool loads = std::any_of(scene.joints.begin(), scene.joints.end(), [](const JointScene& j) { return j.loads; });
+  const auto branches = [&](size_t row) {
+    return motion.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(motion.laws[row]);
+  };
+  return output_table(scene, tree, motion.time.size(), [&](size_t row) {
+    const double t = motion.time[row];
+    const VectorXd& y = motion.y[row];
+    return Moment{t, tree.unpack(y),
+                  loads ? tree.joint_loads(t, y, closed_stops(tree, y), branches(row))
+                        : std::vector<JointLoad>(scene.joints.size()),
+                  motion.balance[row]};
+  });
+}
+
+void describe_model(const Scene& scene, const Run& run, std::vector<std::string>& plan) {
+  for (size_t i = 0; i < scene.bodies.size(); ++i) {
+    const BodyScene& b = scene.bodies[i];
+    if (b.rigid) plan.push_back(fmt::format("{}: rigid, {:g} kg", b.name, b.rigid->mass));
+    if (b.reduced)
+      plan.push_back(fmt::format("{}: reduced body of {}, {} coordinates; its own truncation is not measured", b.name,
+                                 b.reduced_file.string(), run.bodies[i].body.n()));
+    if (run.bodies[i].body.n() == 0) continue;
+    if (!tip_of(run.bodies[i].body))
+      plan.push_back(fmt::format("{0}: no output {0}.tip: {1}", b.name, no_tip(run.bodies[i].body)));
+    const bool known = !run.bodies[i].body.Kg.spin.empty();
+    const bool on = run.tree->stiffening(static_cast<int>(i)) == Stiffening::on;
+    plan.push_back(
+        known ? fmt::format(
+                    "{}: geometric stiffness {} (stiffening = \"{}\"): its effect reaches {:.2g} of the stiffness of "
+                    "the body",
+                    b.name, on ? "on" : "off", b.stiffening, run.motion.stiffening_effect[i].size)
+              : fmt::format("{}: geometric stiffness is not in the equations{}", b.name,
+                            b.reduced               ? ": it is not in the file"
+                            : b.structure == "eq14" ? ": structure \"eq14\" has none"
+                                                    : "; what it may change is error_budget.linearisation"));
+  }
+  for (const JointScene& j : scene.joints)
+    plan.push_back(fmt::format("joint {}: {}, {} on {}{}{}", j.name, joint_type(j.kind).name, j.b.body,
+                               j.a.body.empty() ? "the inertial frame" : j.a.body,
+                               j.motion.empty() ? "" : ", motion prescribed", j.closes_loop ? ", closes a loop" : ""));
+  for (const WheelTurn& t : turns_of(scene.turns))
+    plan.push_back(fmt::format("{} turns by {:g} rad about ({:g}, {:g}, {:g}), {}, from {:g} s to {:g} s",
+                               scene.turns.front().body, t.manoeuvre.angle, t.axis.x(), t.axis.y(), t.axis.z(),
+                               t.manoeuvre.profile, t.manoeuvre.start, rest_to_rest(t.manoeuvre).corners.back()));
+  plan.insert(plan.end(), run.notes.begin(), run.notes.end());
+}
+
+}  // namespace flexboom

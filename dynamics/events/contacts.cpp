@@ -1,0 +1,143 @@
+#include "dynamics/events/contacts.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace flexboom {
+
+using Eigen::Vector3d;
+
+std::string_view event_name(const StopEvent& e) {
+  constexpr std::array<std::string_view, 10> names = {"",     "kink",   "engage", "disengage", "stick",
+                                                      "slip", "impact", "rest",   "leave",     "latch"};
+  if (e.kind == EventKind::stop) return e.contact ? "contact" : "release";
+  return names[static_cast<std::size_t>(e.kind)];
+}
+
+Stop stop_of(const Joint& joint, std::size_t index, const ReducedBody& beyond) {
+  double inertia = beyond.m;
+  if (joint.kind == JointKind::hinge) {
+    const Vector3d at = joint.b.marker.empty() ? joint.b.position : marker(beyond, joint.b.marker).position;
+    const Vector3d axis = joint.b.axes.col(2), centre = beyond.mc0 / beyond.m, arm = centre - at;
+    inertia =
+        axis.dot(beyond.J0 * axis) + beyond.m * (axis.cross(arm).squaredNorm() - axis.cross(centre).squaredNorm());
+  }
+  const HingeMechanism& m = joint.mechanism;
+  return {index, joint.name, m.stop_stiffness > 0, std::sqrt(inertia / (m.stiffness + m.stop_stiffness)),
+          std::sqrt(m.stiffness / inertia)};
+}
+
+namespace {
+
+/// Bounces that are left out change what they shake: a hundredth of the tolerance. Under 1e-10 they are below the noise
+/// of some methods, which would then not have the same contacts.
+double default_settle(double tolerance) { return std::max(tolerance / 100, std::min(tolerance, 1e-10)); }
+
+}  // namespace
+
+Contacts::Contacts(std::vector<Stop> stops, const FlightOptions& options, std::size_t joints)
+    : stops_(std::move(stops)),
+      settle_(options.settle < 0 ? default_settle(options.tolerance) : options.settle),
+      history_(stops_at_start(options, joints)),
+      closed_(stops_.size(), 0),
+      armed_(stops_.size(), 0),
+      crossed_(stops_.size(), 0),
+      approach_(stops_.size()),
+      asleep_(stops_.size(), 0.0) {
+  for (std::size_t i = 0; i < size(); ++i) armed_[i] = stops_[i].is_there && history_[stops_[i].joint].settled < 0;
+}
+
+void Contacts::begin(StopMotion& motion) {
+  constexpr double round_off = 4e-16;
+  const std::vector<char> open(size(), 0);
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Gap gap = motion.gap(i);
+    approach_[i].observe(gap.value, gap.rate, stops_[i].spring_rate);
+    if (!armed_[i]) continue;
+    const bool on = std::abs(gap.value) < round_off;
+    const bool goes = gap.rate > 0 || (gap.rate == 0 && on && motion.push(i, open).acceleration > 0);
+    closed_[i] = history_[stops_[i].joint].closed.value_or(on ? goes : gap.value > 0);
+  }
+}
+
+bool Contacts::update(StopMotion& motion, double t, std::vector<StopEvent>& events) {
+  bool changed = false;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Gap gap = motion.gap(i);
+    StopHistory& history = history_[stops_[i].joint];
+    history.largest_rate = std::max(history.largest_rate, std::abs(gap.rate));
+    history.largest_gap = std::max(history.largest_gap, std::abs(gap.value));
+    if (!stops_[i].is_there) continue;
+    const bool slipped = slipped_through(i, gap, motion.noise(i));
+    if (crossed_[i] != 0 || slipped) {
+      changed = true;
+      if (has_decayed(i, gap, motion)) {
+        settle(i, t);
+      } else {
+        closed_[i] = slipped ? gap.value > 0 : crossed_[i] > 0;
+        if (!slipped) motion.put_on_stop(i);  // exactly: the root is good to round-off of t
+        events.push_back({t, static_cast<int>(stops_[i].joint), closed_[i] != 0, gap.rate});
+        chatter_.contact(t, stops_[i].name);
+        approach_[i].restart(gap.rate);
+        if (std::abs(gap.rate) * stops_[i].period < small(i, motion) && !is_pushed(i, motion)) settle(i, t);
+      }
+    } else if (!armed_[i] && std::max(std::abs(gap.rate) * stops_[i].period, gap.value) >
+                                 2 * std::max(small(i, motion), asleep_[i])) {
+      wake(i, gap);
+      changed = true;
+    }
+    approach_[i].observe(gap.value, gap.rate, stops_[i].spring_rate);
+  }
+  return changed;
+}
+
+std::vector<StopHistory> Contacts::histories() const {
+  std::vector<StopHistory> all = history_;
+  for (std::size_t i = 0; i < size(); ++i) all[stops_[i].joint].closed = closed_[i] != 0;
+  return all;
+}
+
+/// Is the gap on the wrong side of the flag, with no crossing found? A root finder sees no sign change where the gap
+/// starts at zero and stays there for a while.
+bool Contacts::slipped_through(std::size_t i, Gap gap, double noise) const {
+  if (!armed_[i] || crossed_[i] != 0) return false;
+  return closed_[i] ? gap.value < -noise : gap.value > noise;
+}
+
+/// Size of motions about the stop that are not followed: those the scene does not ask for, and those that are hardly
+/// more than noise, whose crossings would be as dense as the steps.
+double Contacts::small(std::size_t i, const StopMotion& motion) const {
+  return std::max(settle_ * history_[stops_[i].joint].largest_rate * stops_[i].period, motion.noise(i));
+}
+
+/// Is a crossing at this rate but the end of a motion that has died out on its way to the stop?
+bool Contacts::has_decayed(std::size_t i, Gap gap, StopMotion& motion) {
+  if (!approach_[i].has_decayed(gap.rate)) return false;
+  const double period = stops_[i].period;
+  asleep_[i] = std::max(small(i, motion), approach_[i].round_off() * period);
+  if (!(std::abs(gap.rate) * period < asleep_[i])) return false;
+  const Push push = motion.push(i, closed_);
+  return std::abs(push.acceleration) * period * period <= 2 * asleep_[i] + push.open * period * period;
+}
+
+/// Does something push a joint that is on its stop, so that it will not stay there? One that is pressed against its
+/// stop swings in it, and comes back to where the stop begins with no rate left.
+bool Contacts::is_pushed(std::size_t i, StopMotion& motion) const {
+  const double period = stops_[i].period;
+  return std::abs(motion.push(i, closed_).acceleration) * period * period > 2 * small(i, motion);
+}
+
+void Contacts::settle(std::size_t i, double t) {
+  history_[stops_[i].joint].settled = t;
+  armed_[i] = closed_[i] = 0;
+}
+
+void Contacts::wake(std::size_t i, Gap gap) {
+  history_[stops_[i].joint].settled = -1;
+  asleep_[i] = 0;
+  armed_[i] = 1;
+  closed_[i] = gap.value > 0;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,174 @@
+#pragma once
+
+#include "dynamics/events/contacts.hpp"
+#include "dynamics/events/laws.hpp"
+#include "fem/base/check.hpp"
+#include "fem/base/stopwatch.hpp"
+
+#include <fmt/format.h>
+
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace flexboom {
+
+/// One run: the loop around a method, whatever the coordinates. A motion says how it steps, what it records and where
+/// its stops are; the loop says when. Result: time, events and summary, and rows that the motion records.
+template <class Result>
+class Flight : protected StopMotion, protected LawMotion {
+ public:
+  Flight(const FlightOptions& options, const Checkpoint<Result>& so_far, std::vector<Stop> stops, std::size_t joints,
+         Laws laws = {})
+      : options_(options),
+        contacts_(std::move(stops), options, joints),
+        laws_(std::move(laws)),
+        outputs_(options),
+        t_(options.start),
+        so_far_(so_far),
+        clock_(options) {}
+
+  /// @throws NumericalError when the method fails; what was flown until then was told to the checkpoint.
+  Result fly() {
+    record(t_, y_);
+    checkpoint();
+    try {
+      restart();
+      while (t_ < options_.duration && !stopped()) {
+        advance();
+        if (clock_.due() && t_ < options_.duration) checkpoint();
+      }
+    } catch (const NumericalError&) {
+      checkpoint();
+      throw;
+    }
+    close();
+    return std::move(result_);
+  }
+
+ protected:
+  /// The method begins at t_ and y_, with contacts_ and laws_ as they are.
+  virtual void restart() = 0;
+  /// One step to t and y, not beyond `limit`, and what contacts_.crossed() and laws_.crossed() it ended at. Where it
+  /// throws, t_ and y_ stay.
+  virtual void step(double limit, double& t, Eigen::VectorXd& y) = 0;
+  /// States within the last step, a column each; Y may have more columns.
+  virtual void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) = 0;
+  /// Adds a row to the result.
+  virtual void record(double t, Eigen::VectorXd y) = 0;
+  /// Forgets all rows but the first.
+  virtual void keep_rows(std::size_t rows) = 0;
+  /// Fills in the summary of what was recorded.
+  virtual void finish() = 0;
+  /// The state that a step arrived at: what errors are weighed by.
+  virtual void observe(const Eigen::VectorXd& y) = 0;
+
+  double output_time() const { return outputs_.after(result_.time.size()); }
+
+  bool stopped() {
+    const bool stop = options_.interrupt != nullptr && options_.interrupt->load(std::memory_order_relaxed);
+    result_.summary.interrupted = result_.summary.interrupted || stop;
+    return stop;
+  }
+
+  long steps() const { return steps_; }
+  double seconds() const { return watch_.seconds(); }
+
+  const FlightOptions& options_;
+  Contacts contacts_;
+  Laws laws_;
+  OutputTimes outputs_;
+  double t_;
+  Eigen::VectorXd y_;
+  Result result_;
+
+ private:
+  void advance() {
+    double t = t_;
+    next_y_ = y_;
+    step(limit(), t, next_y_);
+    if (++steps_ > options_.max_steps)
+      throw NumericalError(
+          fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t, options_.duration));
+    if (!next_y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", t));
+    t_ = t, y_.swap(next_y_);
+    write_outputs();
+    observe(y_);
+    const bool met = contacts_.update(*this, t_, result_.events), changed = laws_.update(*this, t_, result_.events);
+    if (changed) observe(y_);  // sudden losses are large at once
+    if (met || changed || at_corner()) {
+      restart();
+      ++result_.summary.restarts;
+    }
+    if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
+  }
+
+  /// Outputs up to t_: those within the step as many at a time as go at once.
+  void write_outputs() {
+    constexpr std::size_t at_once = 16;
+    samples_.resize(y_.size(), at_once);
+    for (;;) {
+      times_.clear();
+      double next = output_time();
+      for (; times_.size() < at_once && next < t_; next = outputs_.after(result_.time.size() + times_.size()))
+        times_.push_back(next);
+      if (times_.empty() || stopped()) break;
+      interpolate(times_, samples_);
+      for (std::size_t i = 0; i < times_.size(); ++i) {
+        if (options_.progress && result_.time.size() % 1024 == 0) options_.progress(times_[i], options_.duration);
+        record(times_[i], samples_.col(static_cast<Eigen::Index>(i)));
+      }
+    }
+    if (output_time() == t_ && !stopped()) record(t_, y_);
+  }
+
+  /// Where the next step must end at the latest. What is nearer than round-off is reached.
+  double limit() const {
+    const double reached = t_ + round_off();
+    double end = options_.duration;
+    const auto corner = std::upper_bound(options_.corners.begin(), options_.corners.end(), reached);
+    if (corner != options_.corners.end()) end = std::min(end, *corner);
+    if (const double output = output_time(); options_.step_to_outputs && output > reached) end = std::min(end, output);
+    return end;
+  }
+
+  bool at_corner() const {
+    return std::ranges::any_of(options_.corners, [this](double c) { return std::abs(c - t_) <= round_off(); });
+  }
+
+  double round_off() const { return 1e-14 * options_.duration; }
+
+  /// The summary, and where a flight that was interrupted between two outputs is, a row of that.
+  void close() {
+    if (result_.summary.interrupted && result_.time.back() < t_) record(t_, y_);
+    result_.summary.seconds = seconds();
+    result_.summary.stops = contacts_.histories();
+    laws_.add_histories(result_.summary.stops);
+    finish();
+  }
+
+  /// What an interruption here would leave.
+  void checkpoint() {
+    if (so_far_) {
+      const std::size_t rows = result_.time.size();
+      const auto before = result_.summary;
+      result_.summary.interrupted = true;
+      close();
+      so_far_(result_, rows);
+      result_.summary = before;
+      result_.time.resize(rows);
+      keep_rows(rows);
+    }
+    clock_.restart();
+  }
+
+  const Checkpoint<Result>& so_far_;
+  CheckpointClock clock_;
+  Stopwatch watch_;
+  Eigen::VectorXd next_y_;
+  std::vector<double> times_;  // of outputs within a step, and their states
+  Eigen::MatrixXd samples_;
+  long steps_ = 0;
+};
+
+}  // namespace flexboom

@@ -1,0 +1,432 @@
+#include "dynamics/methods/exponential.hpp"
+
+#include "dynamics/methods/followers.hpp"
+#include "dynamics/methods/stop_search.hpp"
+#include "dynamics/numerics/linear_part.hpp"
+#include "dynamics/numerics/small_product.hpp"
+#include "fem/base/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr int max_sweeps = 12;
+constexpr double rung = 1.4142135623730951;  // between step sizes
+constexpr double near_by = 0.3;              // joints this near to where L was taken hardly change it [rad] or [m]
+
+/// The nearest of the step sizes that grids are kept for.
+double on_ladder(double h) { return std::exp2(std::round(2 * std::log2(h)) / 2); }
+
+class ExponentialStepper final : public Stepper {
+ public:
+  ExponentialStepper(std::unique_ptr<SplitProblem> problem, const ErrorScale& scale)
+      : problem_(std::move(problem)),
+        layout_(problem_->layout()),
+        scale_(scale),
+        nx_(layout_.x),
+        motion_(*problem_, scale),
+        search_(layout_.gaps),
+        y_(VectorXd::Zero(layout_.size)),
+        y_dot_(layout_.size),
+        F_(nx_, points),
+        scaled_coefficients_(collocation::coefficients()) {
+    double factorial = 1;
+    for (int m = 0; m < points; ++m, factorial *= m) {
+      scaled_coefficients_.col(m) *= factorial;
+      middle_[m] = collocation::middle_polynomial()[m] * factorial;
+    }
+    step_.X.resize(nx_, points);
+    for (const SplitLayout::Turn& turn : layout_.turns) {
+      for (int i = 0; i < 3; ++i) watched_.push_back(turn.omega + i);
+      y_[turn.attitude] = 1;
+    }
+    for (const auto& [gap, rate] : layout_.gaps)
+      for (const int entry : {gap, rate}) watched_.push_back(entry);
+    watched_x_.resize(std::ssize(watched_), inner);
+    x_at_end_.resize(nx_, 2);
+    if (!(scale.tolerance > 4e-16))
+      throw NumericalError(fmt::format(
+          "exponential: the tolerance asks for {:.2g} of each step, which is below round-off", scale.tolerance));
+  }
+
+  void restart(double t, const VectorXd& y, std::span<const char> contact, std::span<const char> armed) override {
+    step_.start = t;
+    pending_ = false;
+    contact_.assign(contact.begin(), contact.end());
+    armed_.assign(armed.begin(), armed.end());
+    step_.linear = &linear_part(y);
+    begin(y);
+    first_ = true;
+    h_ = first_step();
+    if (step_.linear->step > 0) h_ = std::min(h_, step_.linear->step);
+  }
+
+  void step(double t_end, double& t, VectorXd& y, std::span<int> crossed) override {
+    std::ranges::fill(crossed, 0);
+    if (pending_) advance_start();
+    for (int failures = 0;; ++failures) {
+      const double left = t_end - step_.start;
+      const bool last = h_ >= left * (1 - 1e-12);
+      step_.length = last ? left : h_;
+      if (last) step_.linear->grid(step_.length, spare_);
+      step_.grid = last ? &spare_ : &step_.linear->kept_grid(step_.length);
+      const double error = solve(left);
+      if (error <= 1) {
+        ++counts_.steps;
+        choose_step(error, last);
+        break;
+      }
+      ++counts_.error_test_failures;
+      if (!(step_.length > 1e-14 * std::max(1.0, std::abs(step_.start))))
+        throw MethodFailure(
+            fmt::format("exponential: no step is small enough at t = {:.9g} s; eigenvalues reach {:.2g} 1/s, whose "
+                        "round-off may be more than the tolerance: fewer modes, or a coarser one",
+                        step_.start, step_.linear->lambda.cwiseAbs().maxCoeff()));
+      h_ = std::isfinite(error) ? smaller(error) : on_ladder(step_.length / (rung * rung));
+      if (!std::isfinite(error)) relinearise(failures < 6 ? 1e-3 : 1e-9);
+    }
+    end_ = search_.first_crossing(step_, contact_, armed_, crossed);
+    if (end_ == 0) {
+      y = start_;
+    } else if (end_ == 1) {
+      y.head(nx_) = step_.X.col(degree);
+      motion_.turn(step_, (*step_.grid)[degree], 1, y);
+    } else {
+      step_.linear->point(end_, step_.length, scratch_);
+      step_.linear->combine(scratch_, 0, step_.Z.col(0), step_.M, integral_);
+      step_.linear->to_x(integral_, y.head(nx_));
+      motion_.turn(step_, scratch_, end_, y);
+    }
+    t = step_.start + end_ * step_.length;
+    if (end_ == 1 && step_.length == t_end - step_.start) t = t_end;
+    kept_ = motion_.keep_momentum(t, y);
+    motion_.place(step_, end_, y);
+    pending_ = true;
+    reached_ = t;
+    reached_state_ = y;
+  }
+
+  /// By the linear part alone, with the remainder as it is at the start: as far as that part is good for.
+  void predict(double t_end, const std::function<void(const VectorXd& y)>& look) override {
+    const double left = t_end - step_.start;
+    step_.M.setZero();
+    VectorXd y = start_;
+    for (double t = left; t > 1e-10 * left; t /= 2) {
+      step_.length = t;
+      step_.M.col(0) = t * step_.N.col(0);
+      step_.linear->point(1, t, scratch_);
+      step_.linear->combine(scratch_, 0, step_.Z.col(0), step_.M, integral_);
+      step_.linear->to_x(integral_, y.head(nx_));
+      motion_.turn(step_, scratch_, 1, y);
+      motion_.place(step_, 1, y);
+      if (y.allFinite() && serves(*step_.linear, y)) look(y);
+    }
+  }
+
+  void interpolate(double t, VectorXd& y) override {
+    MatrixXd Y(layout_.size, 1);
+    interpolate_all(std::span(&t, 1), Y);
+    y = Y;
+  }
+
+  void interpolate_all(std::span<const double> times, MatrixXd& Y) override {
+    const auto count = std::ssize(times);
+    between_.resize(step_.linear->size(), count);
+    const auto fraction = [&](Index i) { return (times[static_cast<size_t>(i)] - step_.start) / step_.length; };
+    for (Index i = 0; i < count; ++i) {
+      step_.linear->point(fraction(i), step_.length, scratch_);
+      step_.linear->combine(scratch_, 0, step_.Z.col(0), step_.M, between_.col(i));
+      motion_.turn(step_, scratch_, fraction(i), Y.col(i));
+    }
+    step_.linear->to_x(between_, Y.topLeftCorner(nx_, count));
+    for (Index i = 0; i < count; ++i) motion_.place(step_, fraction(i), Y.col(i));
+  }
+
+  double fastest() const override { return step_.linear->fastest; }
+
+  StepCounts counts() const override { return counts_; }
+
+ private:
+  static constexpr int degree = collocation::degree;
+  static constexpr int points = collocation::points;
+  static constexpr int inner = points - 2;
+
+  /// The linear part for the stops that are closed, near the joints' coordinates of y: made when first met.
+  LinearPart& linear_part(const VectorXd& y) {
+    auto& place = linear_parts_[contact_];
+    if (!place || !serves(*place, y)) place = make_linear_part(base_at(y));
+    return *place;
+  }
+
+  /// At rest, undeformed, joints where they are; on their thresholds where they are near: what belongs to different
+  /// stops belongs to the same place then.
+  VectorXd base_at(const VectorXd& y) const {
+    VectorXd base = y;
+    base.head(nx_).setZero();
+    for (const int i : layout_.joints)
+      if (std::abs(y[i]) > near_by) base[i] = y[i];
+    for (const int i : layout_.spins) base[i] = y[i];
+    return base;
+  }
+
+  bool serves(const LinearPart& part, const VectorXd& y) const {
+    const auto far = [&](int i) { return !(std::abs(part.base[i] - y[i]) <= near_by); };
+    return std::ranges::none_of(layout_.joints, far) &&
+           std::ranges::none_of(layout_.turns, [&](const SplitLayout::Turn& turn) {
+             const auto here = y.segment<4>(turn.attitude), there = part.base.segment<4>(turn.attitude);
+             return layout_.attitudes_matter && 2 * std::acos(std::min(1.0, std::abs(here.dot(there)))) > near_by;
+           });
+  }
+
+  std::unique_ptr<LinearPart> make_linear_part(const VectorXd& base) {
+    ++counts_.jacobian_evaluations;
+    ++counts_.factorisations;
+    // A coordinate that nothing pulls back (a hinge without a spring) has no two eigenvectors of its own. With a period
+    // of two hours in L it has; the remainder takes the difference.
+    constexpr double pull = 1e-6;
+    const auto hold = [](MatrixXd& J, const SplitLayout::Coordinate& c) {
+      if (J.col(c.value).cwiseAbs().maxCoeff() < pull) J(c.rate, c.value) -= pull;
+    };
+    // On its threshold a stop has no force, and is in the column of its gap alone.
+    const auto [other, stop] = neighbour(base);
+    if (other != nullptr && base[layout_.gaps[stop].value] == 0) {
+      const SplitLayout::Coordinate& gap = layout_.gaps[stop];
+      const int column = gap.value;
+      MatrixXd J = other->L;
+      J.col(column) = problem_->linear(step_.start, base.data(), contact_, column, 1);
+      hold(J, gap);
+      try {
+        return std::make_unique<LinearPart>(*other, J, column);
+      } catch (const NumericalError&) {
+        // The block alone has no full set of eigenvectors, or two in one place; all of L may do.
+      }
+    }
+    MatrixXd J = problem_->linear(step_.start, base.data(), contact_, 0, nx_);
+    if (const double largest = J.cwiseAbs().maxCoeff(); !(largest * largest < std::numeric_limits<double>::max()))
+      throw NumericalError(fmt::format(  // no other method could, so this is no failure of the method
+          "the Jacobian of the equations of motion has entries of {:.2g}, whose squares overflow", largest));
+    for (const int i : layout_.prescribed) J.row(i).setZero(), J.col(i).setZero();
+    for (const SplitLayout::Coordinate& c : layout_.coordinates) hold(J, c);
+    std::vector<int> omegas;
+    for (const SplitLayout::Turn& turn : layout_.turns) omegas.push_back(turn.omega);
+    try {
+      return std::make_unique<LinearPart>(J, omegas, base);
+    } catch (const NumericalError&) {  // several that are pulled by each other alone
+      for (const auto& [value, rate] : layout_.coordinates) J(rate, value) -= pull;
+      return std::make_unique<LinearPart>(std::move(J), omegas, base);
+    }
+  }
+
+  /// A linear part at the same place that differs in one stop, and which.
+  std::pair<const LinearPart*, size_t> neighbour(const VectorXd& base) const {
+    for (const auto& [contact, part] : linear_parts_) {
+      if (!part || part->base.head(nx_) != base.head(nx_)) continue;
+      const auto [here, there] = std::ranges::mismatch(contact_, contact);
+      if (here != contact_.end() && std::equal(here + 1, contact_.end(), there + 1))
+        return {part.get(), static_cast<size_t>(here - contact_.begin())};
+    }
+    return {};
+  }
+
+  /// Takes L where the step starts, unless it was taken near there: that costs as much as some steps.
+  void relinearise(double near) {
+    VectorXd base = start_;
+    for (const auto& [value, rate] : layout_.coordinates) base[rate] = 0;
+    for (const SplitLayout::Turn& turn : layout_.turns) base.segment<3>(turn.omega).setZero();
+    const auto there = step_.linear->base.head(nx_), here = base.head(nx_);
+    if ((there - here).norm() <= near * std::max(there.norm(), here.norm())) return;
+    linear_parts_[contact_] = make_linear_part(base);
+    step_.linear = linear_parts_[contact_].get();
+    begin(start_);
+    first_ = true;
+  }
+
+  double first_step() const {
+    // A tenth of the period of the slowest vibration that is not overdamped; the error test takes it from there.
+    double slowest = 0;
+    for (Index k = 0; k < step_.linear->lambda.size(); ++k) {
+      const double w = std::abs(step_.linear->lambda[k].imag());
+      if (w > 1e-3) slowest = slowest == 0 ? w : std::min(slowest, w);
+    }
+    return std::exp2(std::floor(std::log2(slowest > 0 ? 0.6 / slowest : 0.01)));
+  }
+
+  void begin(const VectorXd& y) {
+    const Index m = step_.linear->size();
+    start_ = y;
+    step_.Z.resize(m, points);
+    step_.M.resize(m, points);
+    step_.N.resize(m, points);
+    integral_.resize(m);
+    zero_.setZero(m);
+    at_end_.resize(m, 2);
+    if (step_.linear->watched_modes.size() == 0)
+      step_.linear->watched_modes = step_.linear->from_modes(watched_, Eigen::all);
+    step_.linear->to_z(y.head(nx_), step_.Z.leftCols(1));
+    step_.X.col(0) = y.head(nx_);
+    motion_.start(step_.start, y);
+    evaluate(0);
+    step_.linear->remainder(F_.leftCols(1), step_.Z.leftCols(1), step_.N.leftCols(1));
+  }
+
+  /// The end of the last step is the start of the next; N and the power there are those before momentum was kept, which
+  /// is less than the error that was allowed.
+  void advance_start() {
+    pending_ = false;
+    motion_.go_on(step_, reached_state_);
+    step_.start = reached_;
+    start_ = reached_state_;
+    step_.Z.col(0) = step_.Z.col(degree).eval();
+    step_.X.col(0) = reached_state_.head(nx_);
+    step_.N.col(0) = step_.N.col(degree).eval();
+    if (!kept_.isZero(0)) step_.Z.col(0) += step_.linear->to_modes.middleCols<3>(layout_.roots.front().omega) * kept_;
+    first_ = false;
+  }
+
+  /// The time at a fraction c. What is given as a function of time may jump where a step starts or ends: inside of it,
+  /// by round-off, there is one value.
+  double within_step(double c) const {
+    const double end = step_.start + step_.length;
+    const double inside = std::min(0.25 * step_.length, 4e-16 * std::max(std::abs(step_.start), std::abs(end)));
+    return std::clamp(step_.start + c * step_.length, step_.start + inside, end - inside);
+  }
+
+  /// F and what follows x needs at point j.
+  void evaluate(int j) {
+    const double c = collocation::node(j);
+    y_.head(nx_) = step_.X.col(j);
+    if (layout_.attitudes_matter && j == 0) y_ = start_;
+    if (layout_.attitudes_matter && j > 0) {
+      motion_.turn(step_, (*step_.grid)[static_cast<size_t>(j)], c, y_);
+      motion_.place(step_, c, y_);
+    }
+    const double t = within_step(c);
+    problem_->derivative(t, y_.data(), contact_, y_dot_.data());
+    ++counts_.rhs_evaluations;
+    F_.col(j) = y_dot_.head(nx_);
+    for (const int i : layout_.prescribed) F_(i, j) = 0;
+    motion_.take(j, t, y_, y_dot_);
+  }
+
+  /// Sweeps until the points stand still; returns the error in units of the one allowed, infinite when they do not.
+  double solve(double left) {
+    predict();
+    motion_.forget();  // a failed step left what it had
+    double last_change = 0;
+    for (int sweep = 0; sweep < max_sweeps; ++sweep) {
+      small_product(step_.N, step_.length * scaled_coefficients_, step_.M);
+      for (int j = 1; j < points; ++j)
+        step_.linear->combine((*step_.grid)[static_cast<size_t>(j)], 0, step_.Z.col(0), step_.M, step_.Z.col(j));
+      double change = std::numeric_limits<double>::infinity();
+      if (sweep == 0) {
+        step_.linear->to_x(step_.Z.rightCols(degree), step_.X.rightCols(degree));
+      } else {  // the end says whether the points stand still: at the others not all of x is wanted then
+        at_end_.col(0) = step_.Z.col(degree);
+        predict_error(at_end_.col(1));
+        step_.linear->to_x(at_end_, x_at_end_);
+        change = norm(x_at_end_.col(0) - step_.X.col(degree));
+        step_.X.col(degree) = x_at_end_.col(0);
+      }
+      if (!std::isfinite(change) && sweep > 0) return change;
+      if (sweep > 1 && change > last_change && change > 1) return std::numeric_limits<double>::infinity();
+      const double ratio = sweep > 1 ? std::min(0.9, change / last_change) : contraction_;
+      if (sweep > 1) contraction_ = std::max(1e-3, ratio);
+      if (sweep > 0 && change * ratio <= 0.1) break;
+      if (sweep + 1 == max_sweeps) return std::numeric_limits<double>::infinity();
+      last_change = change;
+      if (sweep > 0) step_.linear->to_x(step_.Z.middleCols<inner>(1), step_.X.middleCols<inner>(1));
+      if (layout_.attitudes_matter) motion_.follow(step_);
+      for (int j = 1; j < points; ++j) evaluate(j);
+      step_.linear->remainder(F_.rightCols(degree), step_.Z.rightCols(degree), step_.N.rightCols(degree));
+    }
+    small_product(step_.linear->watched_modes, step_.Z.middleCols<inner>(1), watched_x_);
+    step_.X.middleCols<inner>(1)(watched_, Eigen::all) = watched_x_;
+    motion_.follow(step_);
+    return std::max(norm(x_at_end_.col(1)), motion_.error(step_, at_end_.col(1), left));
+  }
+
+  /// What the middle point adds to the interpolation by the others, carried to the end of the step.
+  void predict_error(Eigen::Ref<VectorXd> z) {
+    error_modes_.noalias() = step_.N * collocation::middle_difference();
+    M_error_.noalias() = step_.length * error_modes_ * middle_.transpose();
+    step_.linear->combine((*step_.grid)[degree], 0, zero_, M_error_, z);
+  }
+
+  double norm(const Eigen::Ref<const VectorXd>& e) const {
+    return (e.array() / (scale_.tolerance * scale_.scale.head(nx_).array())).abs().maxCoeff();
+  }
+
+  /// The remainder at the points of a new step: the polynomial of the last one goes on, or it stays as it is.
+  void predict() {
+    if (first_ || last_used_ <= 0) {
+      for (int j = 1; j < points; ++j) step_.N.col(j) = step_.N.col(0);
+      return;
+    }
+    collocation::Table beyond;
+    for (int j = 0; j < points; ++j)
+      beyond.col(j) = collocation::monomials(1 + collocation::node(j) * step_.length / last_used_);
+    small_product(last_N_, beyond.rightCols<degree>(), step_.N.rightCols<degree>());
+  }
+
+  void choose_step(double error, bool last) {
+    last_N_.resizeLike(step_.N);
+    small_product(step_.N, collocation::coefficients(), last_N_);
+    last_used_ = step_.length;
+    if (last) return;
+    const double growth = std::pow(std::max(error, 1e-10), -1.0 / (degree + 1));
+    // Half of what the error allows, up to four times: after a stop the first steps follow what decays at once.
+    if (growth > 1.25 * rung) h_ = on_ladder(step_.length * std::clamp(growth / 2, rung, 4.0));
+    // What the next restart with these stops tries: a failed step costs less than many short ones.
+    if (first_) step_.linear->step = error < 1e-3 ? 8 * step_.length : step_.length;
+  }
+  double smaller(double error) const {
+    double h = step_.length;
+    for (double left = error; left > 1; left /= std::pow(rung, degree + 1)) h /= rung;
+    return on_ladder(h);
+  }
+
+  std::unique_ptr<SplitProblem> problem_;
+  const SplitLayout& layout_;
+  const ErrorScale& scale_;
+  int nx_;
+  std::vector<char> contact_, armed_;
+  std::vector<int> watched_;  // entries of x that are wanted at every point: angular velocities, gaps and their rates
+  std::map<std::vector<char>, std::unique_ptr<LinearPart>> linear_parts_;
+  CollocatedStep step_;
+  Followers motion_;
+  StopSearch search_;
+  Grid spare_;
+  GridPoint scratch_;
+
+  double h_ = 0, end_ = 1, last_used_ = 0, reached_ = 0, contraction_ = 0.1;
+  bool first_ = true, pending_ = false;
+  VectorXd start_, reached_state_;
+  VectorXd y_, y_dot_;
+  MatrixXd F_, last_N_, M_error_, watched_x_, between_;
+  MatrixXd at_end_, x_at_end_;  // of the step: z and x there, and their errors
+  VectorXd error_modes_, zero_, integral_;
+  collocation::Values middle_ = collocation::Values::Zero();
+  collocation::Table scaled_coefficients_;
+  Vector3d kept_ = Vector3d::Zero();
+  StepCounts counts_;
+};
+
+}  // namespace
+
+std::unique_ptr<Stepper> make_exponential(std::unique_ptr<SplitProblem> problem, const ErrorScale& scale) {
+  return std::make_unique<ExponentialStepper>(std::move(problem), scale);
+}
+
+}  // namespace flexboom

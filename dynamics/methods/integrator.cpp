@@ -1,0 +1,58 @@
+#include "dynamics/methods/integrator.hpp"
+
+#include "dynamics/methods/arkode.hpp"
+#include "dynamics/methods/cvode.hpp"
+#include "dynamics/methods/exponential.hpp"
+#include "dynamics/methods/ode.hpp"
+#include "dynamics/relative/split.hpp"
+#include "fem/base/check.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+namespace flexboom {
+
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr std::array<IntegratorMethod, 5> methods = {{
+    {"exponential", "exact in the linear part, collocation of order 8 in the rest", 0.1, nullptr, make_exponential},
+    {"bdf", "CVODE backward differentiation, order 1-5, Newton with the exact Jacobian", 0.005, make_cvode_bdf},
+    {"adams", "CVODE Adams-Moulton, order 1-12, Newton with the exact Jacobian", 0.001, make_cvode_adams},
+    {"dirk", "ARKODE implicit Runge-Kutta, order 5, Newton with the exact Jacobian", 0.005, make_arkode_implicit},
+    {"erk", "ARKODE explicit Runge-Kutta, order 6", 0.01, make_arkode_explicit},
+}};
+
+}  // namespace
+
+void add_counts(const StepCounts& c, IntegrationSummary& s) {
+  s.steps = c.steps;
+  s.rhs_evaluations = c.rhs_evaluations;
+  s.jacobian_evaluations = c.jacobian_evaluations;
+  s.factorisations = c.factorisations;
+  s.newton_iterations = c.newton_iterations;
+  s.error_test_failures = c.error_test_failures;
+}
+
+void Stepper::interpolate_all(std::span<const double> times, Eigen::MatrixXd& Y) {
+  VectorXd y(Y.rows());
+  for (size_t i = 0; i < times.size(); ++i) {
+    interpolate(times[i], y);
+    Y.col(static_cast<Eigen::Index>(i)) = y;
+  }
+}
+
+std::span<const IntegratorMethod> integrator_methods() { return methods; }
+
+const IntegratorMethod& integrator_method(const std::string& name) {
+  std::string known;
+  for (const IntegratorMethod& m : methods) {
+    if (m.name == name) return m;
+    known += fmt::format(" '{}'", m.name);
+  }
+  throw InputError(fmt::format("integrator '{}' is not known; there are:{}", name, known));
+}
+
+}  // namespace flexboom

@@ -1,0 +1,170 @@
+#include "dynamics/methods/stop_search.hpp"
+
+#include "fem/base/lanes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace flexboom {
+
+using Eigen::Index;
+
+double StopSearch::first_crossing(const CollocatedStep& step, std::span<const char> contact,
+                                  std::span<const char> armed, std::span<int> crossed) {
+  roots_.clear();
+  double end = 1;
+  for (size_t i = 0; i < armed.size(); ++i) {
+    if (!armed[i]) continue;
+    const double root = first_crossing(step, static_cast<int>(i), contact[i] ? 1 : -1, end);
+    if (root > 1) continue;
+    roots_.emplace_back(static_cast<int>(i), root);
+    end = std::min(end, root);
+  }
+  // Booms that are alike cross together.
+  const double same = (4e-16 * std::abs(step.start) + 1e-14 * step.length) / step.length;
+  for (const auto& [i, root] : roots_)
+    if (root <= end + same) crossed[static_cast<size_t>(i)] = contact[static_cast<size_t>(i)] ? -1 : 1;
+  return end;
+}
+
+namespace {
+
+/// What each of m modes has of the rate of an entry of x: the real part of f (lambda z + n), where f are its
+/// eigenvectors there, with the sign of the imaginary parts turned. Parts in halves of m; `size`: its square.
+FLEXBOOM_FOR_EACH_PROCESSOR
+void rates_of(Index m, const double* lambda_re, const double* lambda_im, const double* f, const double* z,
+              const double* n, double* rate, double* size) {
+#pragma GCC ivdep
+  for (Index k = 0; k < m; ++k) {
+    const double re = lambda_re[k] * z[k] - lambda_im[k] * z[m + k] + n[k];
+    const double im = lambda_re[k] * z[m + k] + lambda_im[k] * z[k] + n[m + k];
+    rate[k] = f[k] * re + f[m + k] * im;
+    rate[m + k] = f[k] * im - f[m + k] * re;
+    size[k] = rate[k] * rate[k] + rate[m + k] * rate[m + k];
+  }
+}
+
+}  // namespace
+
+void StopSearch::take_rates(const CollocatedStep& step, int entry, int point) {
+  const LinearPart& linear = *step.linear;
+  const Index m = linear.lambda.size();
+  rates_.resize(2 * m), sizes_.resize(m);
+  rates_of(m, linear.lambda_re().data(), linear.lambda_im().data(), linear.of_modes.col(entry).data(),
+           step.Z.col(point).data(), step.N.col(point).data(), rates_.data(), sizes_.data());
+}
+
+std::complex<double> StopSearch::share_of(const CollocatedStep& step, Index mode) const {
+  return std::complex<double>(rates_[mode], rates_[sizes_.size() + mode]) / step.linear->lambda[mode];
+}
+
+StopSearch::Ripple StopSearch::ripple(const CollocatedStep& step, int gap, int point) {
+  take_rates(step, gap, point);
+  const double fastest = sizes_.maxCoeff();
+  double widest = 0;
+  fast_.clear();
+  for (Index k = 0; k < sizes_.size(); ++k) {
+    const std::complex<double> rate = step.linear->lambda[k] * step.length;
+    if (std::norm(rate) < 4) continue;  // slow
+    fast_.push_back({k, rate, share_of(step, k)});
+    widest = std::max(widest, std::norm(fast_.back().share));
+  }
+  // Less than a fiftieth of the largest rate and of the widest is nothing.
+  std::erase_if(fast_,
+                [&](const Fast& f) { return sizes_[f.mode] < 4e-4 * fastest && std::norm(f.share) < 4e-4 * widest; });
+  Ripple r;
+  for (const Fast& f : fast_) {
+    if (f.rate.imag() < 2) continue;
+    r.turn = std::max(r.turn, f.rate.imag());
+    r.amplitude += std::abs(f.share);
+  }
+  return r;
+}
+
+template <class At>
+double StopSearch::crossing_at_places(const CollocatedStep& step, const At& at, const Clearance& from,
+                                      const Clearance& to, const Places& places) {
+  // The fast ones go on from the first point as by themselves, and drift to where they are at the second; the rest is
+  // a cubic.
+  const double width = to.c - from.c;
+  Clearance slow_from = from, slow_to = to;
+  take_rates(step, places.gap, places.to);
+  for (Fast& f : fast_) {
+    const std::complex<double> there = places.side * share_of(step, f.mode);
+    f.share *= places.side;
+    f.factor = std::exp(f.rate * width / static_cast<double>(places.parts));
+    slow_from.value -= f.share.real(), slow_from.slope -= (f.rate * f.share).real();
+    slow_to.value -= there.real(), slow_to.slope -= (f.rate * there).real();
+    f.drift = there - f.share * std::exp(f.rate * width);
+  }
+  const Hermite slow(slow_from, slow_to);
+  const auto nearly = [&](int place) {
+    const double s = static_cast<double>(place) / places.parts;
+    Clearance r = slow(from.c + s * width);
+    for (Fast& f : fast_) {
+      f.share *= f.factor;
+      r.value += (f.share + s * f.drift).real();
+      r.slope += (f.rate * f.share + f.drift / width).real();
+    }
+    return r;
+  };
+  const auto exactly = [&](int place) {
+    return place == 0 ? from : place == places.parts ? to : at(from.c + width * place / places.parts);
+  };
+  Clearance here = from;
+  for (int place = 1; place <= places.parts; ++place) {
+    const Clearance next = place == places.parts ? to : nearly(place);
+    if (may_cross(here, next)) {
+      int first = std::max(0, place - 2);  // one further on either side, for `nearly`
+      Clearance a = exactly(first);
+      while (first > 0 && a.value < 0) a = exactly(--first);
+      for (int k = first + 1; k <= std::min(places.parts, place + 1); ++k) {
+        const Clearance b = exactly(k);
+        const double root = crossing_between(at, a, b, places.resolution);
+        if (root != no_crossing) return root;
+        a = b;
+      }
+    }
+    here = next;
+  }
+  return no_crossing;
+}
+
+/// The first fraction of the step where the gap leaves the side of its flag, or no_crossing: behind `end` nobody asks.
+double StopSearch::first_crossing(const CollocatedStep& step, int hinge, double side, double end) {
+  const SplitLayout::Coordinate at_stop = gaps_[static_cast<size_t>(hinge)];
+  const int gap = at_stop.value, rate = at_stop.rate;
+  const LinearPart& linear = *step.linear;
+  z_.resize(linear.size());
+  const auto at = [&](double c) {
+    linear.point(c, step.length, scratch_);
+    linear.combine(scratch_, 0, step.Z.col(0), step.M, z_);
+    return Clearance{c, side * linear.of_modes.col(gap).dot(z_),
+                     side * step.length * linear.of_modes.col(rate).dot(z_)};
+  };
+  const auto at_point = [&](int j) {
+    return Clearance{collocation::node(j), side * step.X(gap, j), side * step.length * step.X(rate, j)};
+  };
+  const Ripple at_start = ripple(step, gap, 0);
+  const double resolution = 4e-16 * std::max(1.0, std::abs(step.start) / step.length);
+  const auto parts_of = [](const Ripple& r, const Clearance& from, const Clearance& to) {
+    constexpr double most = 4096;
+    const double turn = r.turn * (to.c - from.c);
+    const bool clear = turn < 1 || std::min(from.value, to.value) > 2 * r.amplitude;
+    return clear ? 1 : static_cast<int>(std::ceil(std::min(most, turn)));
+  };
+  Clearance from = at_point(0);
+  for (int j = 1; j < collocation::points && from.c <= end; ++j) {
+    const Clearance to = at_point(j);
+    int parts = parts_of(at_start, from, to);
+    if (parts > 1 && j > 1) parts = parts_of(ripple(step, gap, j - 1), from, to);  // what is left of it
+    const double root = parts == 1 ? crossing_between(at, from, to, resolution)
+                                   : crossing_at_places(step, at, from, to, {gap, j, parts, side, resolution});
+    if (root <= 1) return root;
+    if (root == crossed_from_the_start) return 0;  // pressed to the other side from rest on the stop
+    from = to;
+  }
+  return no_crossing;
+}
+
+}  // namespace flexboom

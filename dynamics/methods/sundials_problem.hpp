@@ -1,0 +1,116 @@
+#pragma once
+
+// Internal to `dynamics`: what CVODE and ARKODE share on one system.
+
+#include "dynamics/methods/integrator.hpp"
+#include "dynamics/methods/ode.hpp"
+#include "dynamics/numerics/crossing.hpp"
+
+#include <sundials/sundials_linearsolver.h>
+#include <sundials/sundials_matrix.h>
+#include <sundials/sundials_nvector.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace flexboom::sundials {
+
+/// An Ode as SUNDIALS calls it, with the contacts of a smooth piece. User data of its functions. The matrix that
+/// SUNDIALS gets is a token: I - gamma J lives in the Ode in its own form.
+class Problem {
+ public:
+  Problem(std::unique_ptr<Ode>, const ErrorScale&, SUNContext);
+  ~Problem();
+  Problem(const Problem&) = delete;
+  Problem& operator=(const Problem&) = delete;
+
+  Ode& ode() const { return *ode_; }
+  int size() const { return ode_->size(); }
+  SUNMatrix matrix() const { return matrix_; }
+  SUNLinearSolver solver() const { return solver_; }
+  long jacobians() const { return jacobians_; }
+
+  void set_contacts(std::span<const char> contact) { contact_.assign(contact.begin(), contact.end()); }
+  std::span<const char> contacts() const { return contact_; }
+
+  /// What a function below has caught, thrown on: SUNDIALS is C.
+  void rethrow();
+
+  static int derivative(realtype t, N_Vector y, N_Vector y_dot, void* problem) noexcept;
+  static int weights(N_Vector y, N_Vector weight, void* problem) noexcept;
+  static int linear_system(realtype t, N_Vector y, booleantype jacobian_is_current, booleantype* jacobian_was_updated,
+                           realtype gamma, void* problem) noexcept;
+
+ private:
+  std::unique_ptr<Ode> ode_;
+  const ErrorScale& scale_;
+  std::vector<char> contact_;
+  SUNMatrix matrix_ = nullptr;
+  SUNLinearSolver solver_ = nullptr;
+  std::exception_ptr error_;
+  long jacobians_ = 0;
+};
+
+/// Stops that are met or left within a step.
+class StepCrossings {
+ public:
+  /// Of hinges with armed[i] != 0.
+  void arm(std::span<const char> armed) { armed_.assign(armed.begin(), armed.end()); }
+
+  /// The state at the start of a step.
+  void begin(const Problem& problem, double t, const double* y) {
+    from_.resize(armed_.size());
+    for (size_t i = 0; i < armed_.size(); ++i)
+      if (armed_[i]) from_[i] = clearance(problem, t, y, i, 0, 1);
+  }
+
+  /// The fraction of the step from t that ends at the first crossing, or 1. y: at its end. state_at(c): the state at a
+  /// fraction. crossed[i]: +1 where the gap of hinge i rises through zero there, -1 where it falls, or 0.
+  template <class StateAt>
+  double first(const Problem& problem, double t, double length, const double* y, const StateAt& state_at,
+               std::span<int> crossed) {
+    std::fill(crossed.begin(), crossed.end(), 0);
+    roots_.clear();
+    double end = 1;
+    for (size_t i = 0; i < armed_.size(); ++i) {
+      if (!armed_[i]) continue;
+      const auto at = [&](double c) { return clearance(problem, t + c * length, state_at(c), i, c, length); };
+      Clearance from = from_[i];
+      from.slope *= length;
+      const double resolution = 4e-16 * std::max(1.0, std::abs(t) / length);
+      double root = crossing_between(at, from, clearance(problem, t + length, y, i, 1, length), resolution);
+      if (root == crossed_from_the_start) root = 0;
+      if (root > 1) continue;
+      roots_.emplace_back(i, root);
+      end = std::min(end, root);
+    }
+    // Booms that are alike cross together.
+    const double same = (4e-16 * std::abs(t) + 1e-14 * length) / length;
+    for (const auto& [i, root] : roots_)
+      if (root <= end + same) crossed[i] = problem.contacts()[i] ? -1 : 1;
+    return end;
+  }
+
+ private:
+  /// Of the gap on the side of its flag.
+  static Clearance clearance(const Problem& problem, double t, const double* y, size_t i, double c, double length) {
+    const double side = problem.contacts()[i] ? 1 : -1;
+    const int hinge = static_cast<int>(i);
+    if (hinge >= problem.ode().stops()) {
+      const Gap gap = problem.ode().switch_gap(t, y, hinge);
+      return {c, side * gap.value, side * length * gap.rate};
+    }
+    return {c, side * problem.ode().gap(y, hinge), side * length * problem.ode().gap_rate(y, hinge)};
+  }
+
+  std::vector<char> armed_;
+  std::vector<Clearance> from_;  // slopes per second
+  std::vector<std::pair<size_t, double>> roots_;
+};
+
+}  // namespace flexboom::sundials

@@ -1,0 +1,178 @@
+#include "dynamics/relative/impl.hpp"
+#include "dynamics/relative/momenta.hpp"
+#include "fem/base/check.hpp"
+#include "reduction/invariants/geometric_stiffness.hpp"
+
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <cmath>
+
+namespace flexboom {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using spatial::eigen;
+using spatial::Vec3;
+
+namespace {
+
+/// Everything at (t, y), each link by itself.
+tree::Scratch<double> evaluated(const Tree& system, const tree::Model& model, double t,
+                                const Eigen::Ref<const VectorXd>& y, std::span<const char> contact,
+                                std::span<const LawBranch> laws) {
+  require(y.size() == system.layout().size, "the state has the wrong size");
+  return tree::link_by_link(model, t, y, contact, laws);
+}
+
+void add_joint_energy(const tree::Link& link, const Joint& joint, const Eigen::Ref<const VectorXd>& y,
+                      EnergyLedger& to) {
+  if (link.law) {
+    const LawModel law(joint);
+    to.springs += law.spring_energy(y[link.scalar]), to.stops += law.stop_energy(y[link.scalar]);
+  } else if (link.kind == JointKind::hinge || link.kind == JointKind::slider) {
+    const double in_stop = energy({.stop_stiffness = joint.mechanism.stop_stiffness}, y[link.scalar]);
+    to.springs += energy(joint.mechanism, y[link.scalar]) - in_stop, to.stops += in_stop;
+  }
+}
+
+}  // namespace
+
+Balance Tree::balance(double t, const Eigen::Ref<const VectorXd>& state) const {
+  VectorXd y = state;
+  impose(t, y);
+  return balance(t, y, *workspace());
+}
+
+Balance Tree::balance(double t, const Eigen::Ref<const VectorXd>& y, TreeWorkspace& work) const {
+  require(y.size() == layout().size, "the state has the wrong size");
+  const tree::Model& model = impl_->model;
+  tree::Scratch<double>& scratch = work.scratch;
+  tree::set_instant(model, t, work.instant);
+  tree::Reference near;  // the first body that floats
+  for (const TreeLayout::Joint& joint : impl_->layout.joints) {
+    if (joint.position < 0) continue;
+    const tree::Link& link = *std::ranges::find(model.links, joint.position, &tree::Link::position);
+    if (link.parent >= 0) continue;
+    const Vector3d R = y.segment<3>(joint.position), V = y.segment<3>(joint.velocity);
+    near = {link.a.position + link.a.axes * spatial::vec3(R), link.a.axes * spatial::vec3(V)};
+    break;
+  }
+  const tree::Totals all = tree::totals(model, y.data(), work.instant, near, scratch);
+  Balance b;
+  const Vector3d P = eigen(all.momentum), V = eigen(near.velocity);
+  b.kinetic = all.kinetic + V.dot(P) + 0.5 * all.m * V.squaredNorm();
+  b.momentum = P + all.m * V;
+  b.momentum_scale = all.momentum_scale;
+  b.angular_momentum = eigen(all.angular_momentum_about_mass_centre());
+  b.angular_momentum_scale = all.angular_momentum_scale;
+  b.ledger.structures = all.strain;
+  for (const tree::Link& link : model.links)
+    add_joint_energy(link, impl_->scene.joints[static_cast<size_t>(link.joint)], y, b.ledger);
+  for (const tree::SpringModel& spring : model.springs) {
+    const auto from = tree::find_place(model, spring.a, y.data(), scratch, scratch.U);
+    const auto to = tree::find_place(model, spring.b, y.data(), scratch, scratch.U);
+    const double stretch = eigen(to.position - from.position).norm() - spring.free_length;
+    b.ledger.springs += 0.5 * spring.stiffness * stretch * stretch;
+  }
+  b.elastic = b.ledger.stored();
+  b.potential = -impl_->scene.gravity.dot(eigen(all.first_moment) + all.m * eigen(near.position));
+  b.ledger.elsewhere = y[impl_->layout.dissipated_elsewhere];
+  for (const TreeLayout::Joint& joint : impl_->layout.joints) {
+    b.dissipated_by_joint.push_back(y[joint.dissipated]);
+    b.ledger.dampers += y[joint.dissipated];
+    if (joint.losses < 0) continue;
+    for (int k = 0; k < static_cast<int>(law_losses.size()); ++k) {
+      b.dissipated_by_joint.back() += y[joint.losses + k];
+      b.ledger.laws[static_cast<size_t>(k)] += y[joint.losses + k];
+    }
+  }
+  for (const double d : b.dissipated_by_joint) b.dissipated += d;
+  b.dissipated += b.ledger.elsewhere;
+  b.work = y[impl_->layout.work];
+  return b;
+}
+
+PlaceMotionInSpace Tree::motion(double t, const Eigen::Ref<const VectorXd>& state, const Place& place) const {
+  const tree::Model& model = impl_->model;
+  VectorXd y = state;
+  impose(t, y);
+  tree::Scratch<double> scratch(model, false);
+  tree::Instant instant(model);
+  tree::set_instant(model, t, instant);
+  tree::move_links(model, y.data(), instant, true, scratch);
+  const tree::PlacedOn on = tree::packed_place(model, place, "place");
+  const auto found = tree::find_place(model, on, y.data(), scratch, scratch.U);
+  PlaceMotionInSpace m{eigen(found.position), eigen(found.velocity), eigen(found.omega), {}};
+  for (int i = 0; i < 3; ++i) m.axes.row(i) = eigen(found.axes.row[static_cast<size_t>(i)]).transpose();
+  return m;
+}
+
+std::vector<JointLoad> Tree::joint_loads(double t, const Eigen::Ref<const VectorXd>& y, std::span<const char> contact,
+                                         std::span<const LawBranch> laws) const {
+  const tree::Model& model = impl_->model;
+  const tree::Scratch<double> scratch = evaluated(*this, model, t, y, contact, laws);
+  std::vector<JointLoad> loads(impl_->scene.joints.size());
+  const VectorXd state = y;
+  tree::Instant instant(model);
+  tree::set_instant(model, t, instant);
+  for (size_t i = 0; i < model.links.size(); ++i) {
+    const tree::Link& link = model.links[i];
+    if (link.kind == JointKind::free) continue;
+    const tree::LinkScratch<double>& s = scratch.links[i];
+    const tree::Twist<double> load = tree::joint_load(s);
+    JointLoad& out = loads[static_cast<size_t>(link.joint)];
+    out.force = eigen(load.t), out.torque = eigen(load.w);
+    for (int k = 0; link.prescribed && k < joint_type(link.kind).scalars; ++k)
+      out.drive.push_back(tree::drive_load(link, k, state.data(), instant.drives[i], {},
+                                           contact[static_cast<size_t>(link.joint)] != 0, s));
+  }
+  return loads;
+}
+
+namespace {
+
+/// Kg of the motion of a body; s: what the sweeps left.
+MatrixXd stiffness_of_motion(const ReducedBody& body, const tree::Link& link, const tree::LinkScratch<double>& s) {
+  const Vec3<double>& o = link.brf_origin;
+  const auto& A = link.brf_axes;
+  const Vec3<double> a = s.acceleration.t + cross(s.acceleration.w, o) + cross(s.w, cross(s.w, o));
+  return motion_stiffness(body, eigen(transposed_product(A, s.w)), eigen(transposed_product(A, a)),
+                          eigen(transposed_product(A, s.acceleration.w)));
+}
+
+}  // namespace
+
+StiffeningEffect stiffening_effect(const ReducedBody& body, const MatrixXd& Kg) {
+  const auto [least, most] = relative_stiffness(body, Kg);
+  return {std::max(-least, most), std::max(-least, 0.0)};
+}
+
+std::vector<StiffeningEffect> Tree::stiffening_effect(double t, const Eigen::Ref<const VectorXd>& y,
+                                                      std::span<const char> contact,
+                                                      std::span<const LawBranch> laws) const {
+  const tree::Model& model = impl_->model;
+  const tree::Scratch<double> scratch = evaluated(*this, model, t, y, contact, laws);
+  std::vector<MatrixXd> K(impl_->scene.bodies.size());
+  for (size_t i = 0; i < model.links.size(); ++i) {
+    const tree::Link& link = model.links[i];
+    const tree::LinkScratch<double>& s = scratch.links[i];
+    K[static_cast<size_t>(link.index)] =
+        stiffness_of_motion(impl_->scene.bodies[static_cast<size_t>(link.index)], link, s);
+    if (!link.hung_on_moving_place) continue;
+    const tree::Link& parent = model.links[static_cast<size_t>(link.parent)];
+    const tree::Twist<double> load = tree::joint_load(s);
+    const Vec3<double> F = -(s.A * load.t), M = -(s.A * load.w) + cross(s.lever, F);
+    K[static_cast<size_t>(parent.index)] +=
+        marker_stiffness(impl_->scene.bodies[static_cast<size_t>(parent.index)],
+                         impl_->scene.joints[static_cast<size_t>(link.joint)].a.marker,
+                         eigen(transposed_product(parent.brf_axes, F)), eigen(transposed_product(parent.brf_axes, M)));
+  }
+  std::vector<StiffeningEffect> effect;
+  for (size_t i = 0; i < K.size(); ++i) effect.push_back(flexboom::stiffening_effect(impl_->scene.bodies[i], K[i]));
+  return effect;
+}
+
+}  // namespace flexboom

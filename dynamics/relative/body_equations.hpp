@@ -1,0 +1,208 @@
+#pragma once
+
+// The equations of one flexible body on a hinge, written once for constants C (of one body, or of four side by side)
+// and a scalar T: C, or C with derivatives (README, "Equations of motion"). Internal to `dynamics`.
+
+#include "dynamics/environment/gravity_terms.hpp"
+#include "dynamics/numerics/dual.hpp"
+#include "dynamics/numerics/spatial.hpp"
+
+#include <cmath>
+#include <vector>
+
+namespace flexboom::equations {
+
+/// One non-zero of J1 (component: xx, yy, zz, xy, yz, zx), J2 (the same) or Cr1 (component: x, y, z). A straight boom
+/// that bends in one plane has a handful, a general body n^2 times six: the loops run over what the body has.
+template <class C>
+struct TermOf {
+  int k = 0, l = 0, component = 0;
+  C value = 0;
+};
+using Term = TermOf<double>;
+
+/// Constants of one appendage, packed for the inner loop. Arrays over modes are contiguous.
+template <class C>
+struct BodyOf {
+  int n = 0;
+  C m = 0;
+  Vec3<C> mc0;
+  Sym3<C> J0;
+  std::vector<Vec3<C>> Ct, Cr0;        // n
+  std::vector<TermOf<C>> Cr1, J1, J2;  // non-zeros
+  std::vector<C> Ke, De, Me;           // n x n
+  std::vector<C> Me_inverse;           // n x n
+  bool diagonal = false;               // Ke, De and Me are diagonal: modes, no constraint shapes
+  std::vector<Vec3<C>> Gt;             // Me^-1 Ct^T, n
+  Sym3<C> Ctt;                         // Ct Me^-1 Ct^T
+
+  size_t row_begin(size_t k) const { return diagonal ? k : 0; }
+  size_t row_end(size_t k) const { return diagonal ? k + 1 : static_cast<size_t>(n); }
+
+  C cos_threshold = 0, sin_threshold = 0;
+  C stiffness = 0, preload = 0;  // spring torque = preload - stiffness Delta
+  C damping = 0, stop_stiffness = 0;
+};
+using Body = BodyOf<double>;
+
+/// Quantities of one body that later sweeps need.
+template <class T>
+struct BodyScratch {
+  std::vector<Vec3<T>> Cr;  // Cr(q), n
+  std::vector<Vec3<T>> Gw;  // Me^-1 Cr^T, n
+  std::vector<T> b, g;      // modal force and Me^-1 of it, n
+
+  explicit BodyScratch(size_t n = 0) : Cr(n), Gw(n), b(n), g(n) {}
+};
+
+/// Mass matrix (symmetric, in blocks of translation and rotation) and force of the hub with everything condensed to it,
+/// hub axes.
+template <class T>
+struct HubSystem {
+  Sym3<T> tt, ww;
+  Mat3<T> tw;
+  Vec3<T> ft, fw;
+
+  HubSystem& operator+=(const HubSystem& b) {
+    tt += b.tt, ww += b.ww, ft += b.ft, fw += b.fw;
+    for (size_t i = 0; i < 3; ++i) tw.row[i] += b.tw.row[i];
+    return *this;
+  }
+};
+
+/// A constant as a number with derivatives.
+template <class T, class C>
+Vec3<T> lift(const Vec3<C>& a) {
+  return {T(a.x), T(a.y), T(a.z)};
+}
+template <class T, class C>
+Sym3<T> lift(const Sym3<C>& a) {
+  return {T(a.xx), T(a.yy), T(a.zz), T(a.xy), T(a.yz), T(a.zx)};
+}
+
+/// A (v) A^T of a symmetric matrix.
+template <class T>
+Sym3<T> rotate(const Mat3<T>& A, const Sym3<T>& S) {
+  const Vec3<T> r0 = S * A.row[0], r1 = S * A.row[1], r2 = S * A.row[2];
+  return {dot(A.row[0], r0), dot(A.row[1], r1), dot(A.row[2], r2),
+          dot(A.row[0], r1), dot(A.row[1], r2), dot(A.row[2], r0)};
+}
+
+/// A S A^T of a general matrix.
+template <class T>
+Mat3<T> rotate(const Mat3<T>& A, const Mat3<T>& S) {
+  Mat3<T> r;
+  for (size_t j = 0; j < 3; ++j) {
+    const Vec3<T> c = S * A.row[j];  // S A^T, column j
+    const T x = dot(A.row[0], c), y = dot(A.row[1], c), z = dot(A.row[2], c);
+    (j == 0 ? r.row[0].x : j == 1 ? r.row[0].y : r.row[0].z) = x;
+    (j == 0 ? r.row[1].x : j == 1 ? r.row[1].y : r.row[1].z) = y;
+    (j == 0 ? r.row[2].x : j == 1 ? r.row[2].y : r.row[2].z) = z;
+  }
+  return r;
+}
+
+/// a -= u v^T
+template <class T, class S>
+void subtract_product(Mat3<T>& a, const Vec3<S>& u, const Vec3<T>& v) {
+  a.row[0] -= u.x * v;
+  a.row[1] -= u.y * v;
+  a.row[2] -= u.z * v;
+}
+
+/// Torque of the hinge along +Theta (eqs. 16-19). `closed`: 1 where the stop is, else 0.
+template <class C, class T>
+T hinge_torque(const BodyOf<C>& body, const T& gap, const T& rate, const C& closed) {
+  const C k = body.stiffness + closed * body.stop_stiffness;
+  return body.preload - k * gap - body.damping * rate;
+}
+
+/// Inertia of the deformed body: mc(q), J(q), Jdot; Cr(q) goes to the scratch.
+template <class T>
+struct Inertia {
+  Vec3<T> mc;
+  Sym3<T> J, J_dot;
+};
+
+template <class C, class T>
+Inertia<T> inertia_at(const BodyOf<C>& body, const T* q, const T* q_dot, BodyScratch<T>& s) {
+  Inertia<T> r;
+  r.mc = lift<T>(body.mc0);
+  r.J = lift<T>(body.J0);
+  for (size_t k = 0; k < static_cast<size_t>(body.n); ++k) {
+    r.mc += q[k] * body.Ct[k];
+    s.Cr[k] = lift<T>(body.Cr0[k]);
+  }
+  for (const TermOf<C>& t : body.Cr1) component(s.Cr[static_cast<size_t>(t.l)], t.component) += t.value * q[t.k];
+  for (const TermOf<C>& t : body.J1) {
+    component(r.J, t.component) += t.value * q[t.k];
+    component(r.J_dot, t.component) += t.value * q_dot[t.k];
+  }
+  for (const TermOf<C>& t : body.J2) {  // symmetric in k, l: d/dt(q_k q_l) summed over both is 2 q_dot_k q_l
+    const T vq = t.value * q[t.l];
+    component(r.J, t.component) += vq * q[t.k];
+    component(r.J_dot, t.component) += 2.0 * (vq * q_dot[t.k]);
+  }
+  return r;
+}
+
+/// Forces of structure and damping, -Ke q - De q_dot.
+template <class C, class T>
+void elastic_forces(const BodyOf<C>& body, const T* q, const T* q_dot, T* b) {
+  const auto n = static_cast<size_t>(body.n);
+  for (size_t k = 0; k < n; ++k) {
+    T f = T(0.0);
+    for (size_t l = body.row_begin(k); l < body.row_end(k); ++l)
+      f -= body.Ke[k * n + l] * q[l] + body.De[k * n + l] * q_dot[l];
+    b[k] = f;
+  }
+}
+
+/// Adds the modal forces of the motion, 1/2 w^T dJ/dq_k w + 2 w . (Cr1[k] q_dot) (README, "Equations of motion"), of
+/// one body with angular velocity w in its own axes.
+template <class C, class T>
+void add_inertial_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q, const T* q_dot, T* b) {
+  const T ww[] = {w.x * w.x, w.y * w.y, w.z * w.z, 2.0 * (w.x * w.y), 2.0 * (w.y * w.z), 2.0 * (w.z * w.x)};
+  for (const TermOf<C>& t : body.J1) b[t.k] += (0.5 * t.value) * ww[t.component];
+  for (const TermOf<C>& t : body.J2) b[t.k] += t.value * (q[t.l] * ww[t.component]);
+  const T* const wi[] = {&w.x, &w.y, &w.z};
+  for (const TermOf<C>& t : body.Cr1) b[t.k] += (2.0 * t.value) * (*wi[t.component] * q_dot[t.l]);
+}
+
+/// Both, to the scratch.
+template <class C, class T>
+void modal_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q, const T* q_dot, BodyScratch<T>& s) {
+  elastic_forces(body, q, q_dot, s.b.data());
+  add_inertial_forces(body, w, q, q_dot, s.b.data());
+}
+
+/// Solves the 6 x 6 system of the hub by two 3 x 3 Cholesky factorisations in blocks (LDL^T of the whole, unrolled by a
+/// loop).
+template <class T>
+void solve_hub(const HubSystem<T>& h, Vec3<T>& a, Vec3<T>& alpha) {
+  const Mat3<T>& c = h.tw;
+  T M[6][6] = {{h.tt.xx},
+               {h.tt.xy, h.tt.yy},
+               {h.tt.zx, h.tt.yz, h.tt.zz},
+               {c.row[0].x, c.row[1].x, c.row[2].x, h.ww.xx},
+               {c.row[0].y, c.row[1].y, c.row[2].y, h.ww.xy, h.ww.yy},
+               {c.row[0].z, c.row[1].z, c.row[2].z, h.ww.zx, h.ww.yz, h.ww.zz}};
+  T x[6] = {h.ft.x, h.ft.y, h.ft.z, h.fw.x, h.fw.y, h.fw.z};
+  T inverse[6];
+  for (int j = 0; j < 6; ++j) {  // LDL^T: M[i][j] holds L D until column j is done
+    inverse[j] = T(1.0) / M[j][j];
+    for (int i = j + 1; i < 6; ++i) {
+      const T l = M[i][j] * inverse[j];
+      for (int k = j + 1; k <= i; ++k) M[i][k] -= l * M[k][j];
+      x[i] -= l * x[j];
+    }
+  }
+  for (int j = 5; j >= 0; --j) {
+    for (int i = j + 1; i < 6; ++i) x[j] -= M[i][j] * x[i];
+    x[j] = x[j] * inverse[j];
+  }
+  a = {x[0], x[1], x[2]};
+  alpha = {x[3], x[4], x[5]};
+}
+
+}  // namespace flexboom::equations

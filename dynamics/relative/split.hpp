@@ -1,0 +1,66 @@
+#pragma once
+
+#include "dynamics/relative/tree.hpp"
+
+#include <Eigen/Core>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace flexboom {
+
+/// Places in a state y = (x, followers, energies). x: coordinates and their rates, angular velocities, spins of wheels.
+struct SplitLayout {
+  struct Coordinate {  // entries of x
+    int value, rate;
+  };
+  struct Turn {    // an attitude and the angular velocity that it follows, in the axes that turn
+    int omega;     // entry of x
+    int attitude;  // quaternion, place in y
+    bool is_root;  // of a body that floats in inertial space: what is inside does not feel it
+  };
+  struct Root {  // a body that floats in inertial space
+    int position, velocity, attitude, omega;
+  };
+
+  int x = 0, energies = 0, size = 0;  // number of entries of x; place of the first energy
+  std::vector<Coordinate> coordinates;
+  std::vector<Turn> turns;
+  std::vector<Root> roots;
+  std::vector<Coordinate> gaps;   // per stop
+  std::vector<int> joints;        // entries of x that are coordinates of joints, less their thresholds
+  std::vector<int> spins;         // of wheels
+  std::vector<int> prescribed;    // entries of x that are given functions of time
+  bool outside_pushes = false;    // does gravity or a load move a mass centre?
+  bool attitudes_matter = false;  // does x' depend on an attitude, or on a place?
+  bool momentum_is_kept = false;  // of all bodies, the first root among them
+};
+
+/// All that hangs on a root, in the axes of its position.
+struct FloatingBodies {
+  Eigen::Vector3d mass_centre;       // from the root's position [m]
+  Eigen::Vector3d velocity;          // of the mass centre, less the root's [m/s]
+  Eigen::Matrix3d inertia;           // about the mass centre [kg m^2]
+  Eigen::Vector3d angular_momentum;  // about the mass centre [N m s]
+};
+
+/// What exponential collocation needs of equations of motion: x' = L x + N(t, y), and what follows x. Holds a
+/// workspace: for one thread.
+class SplitProblem {
+ public:
+  virtual ~SplitProblem() = default;
+  virtual const SplitLayout& layout() const = 0;
+  /// contact: one flag per stop.
+  virtual void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) = 0;
+  /// The acceleration of a root's mass centre, at the state of the last `derivative` [m/s^2].
+  virtual Eigen::Vector3d outside_acceleration(size_t root, double t, const double* y) = 0;
+  /// Columns of d(x')/dx.
+  virtual Eigen::MatrixXd linear(double t, const double* y, std::span<const char> contact, int first, int count) = 0;
+  /// By x and attitudes alone. t: of prescribed motions [s].
+  virtual FloatingBodies floating(size_t root, double t, const double* y) = 0;
+};
+
+std::unique_ptr<SplitProblem> split(const Tree&);
+
+}  // namespace flexboom

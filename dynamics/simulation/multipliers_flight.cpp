@@ -1,0 +1,521 @@
+#include "dynamics/events/event_loop.hpp"
+#include "dynamics/numerics/crossing.hpp"
+#include "dynamics/numerics/ida.hpp"
+#include "dynamics/redundant/balance.hpp"
+#include "dynamics/redundant/frame.hpp"
+#include "dynamics/redundant/multipliers.hpp"
+#include "dynamics/redundant/scales.hpp"
+#include "dynamics/redundant/start.hpp"
+#include "fem/base/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace flexboom {
+
+using Eigen::VectorXd;
+using namespace redundant;
+
+namespace {
+
+/// Part of the tolerance wanted over a run that each step is asked for.
+constexpr double local_share = 0.015;
+/// A violation of a joint at the start beyond this [m, rad, their rates] is the caller's mistake.
+constexpr double open_joint = 1e-8;
+
+std::vector<Stop> stops_of(const Equations& equations) {
+  const Multibody& scene = equations.scene();
+  std::vector<Stop> stops;
+  for (size_t i = 0; i < scene.joints.size(); ++i) {
+    const Joint& joint = scene.joints[i];
+    if (equations.joints()[i].stop)
+      stops.push_back(stop_of(joint, i, scene.bodies[static_cast<size_t>(std::max(joint.b.body, 0))]));
+  }
+  return stops;
+}
+
+/// Steps, rows and stops of one run by IDA.
+class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaeProblem {
+ public:
+  MultipliersFlight(const Multipliers& system, Equations& equations, const std::vector<BodyState>& start,
+                    const MultipliersOptions& options, const Checkpoint<MultibodyTrajectory>& so_far)
+      : Flight(options, so_far, stops_of(equations), system.multibody().joints.size(),
+               Laws(system.multibody().joints, options, 1e-15)),
+        equations_(equations),
+        scene_(system.multibody()),
+        options_(options) {
+    const size_t joints = scene_.joints.size();
+    memory_ = {std::vector<char>(joints, 0), std::vector<double>(joints, 0.0), {}};
+    check_sizes(start);
+    frame_ = std::make_unique<FlightFrame>(equations_, start, t_);
+    start_on_constraints(frame_->seen(start));
+    begin_contacts();
+    equations_.make_consistent(t_, y_, y_dot_, memory_);
+    const Balance b = balance_of(equations_, y_, memory_);
+    scales_ = std::make_unique<StateScales>(
+        equations_, y_, y_dot_, std::max(std::abs(b.kinetic) + std::abs(b.elastic), options_.largest.energy),
+        local_share * options.tolerance, options.duration);
+    make_method();
+  }
+
+ private:
+  /// For the unknowns as they are numbered.
+  void make_method() {
+    if (ida_) add(ida_->counts(), past_);
+    assembly_ = {};
+    if (y_dot_.size() != y_.size()) equations_.make_consistent(t_, y_, y_dot_, memory_);
+    record_pattern();
+    ida_ = std::make_unique<Ida>(*this, options_.linear_solver);
+    renumbered_ = false;
+  }
+
+  static void add(const DaeCounts& c, DaeCounts& to) {
+    to.steps += c.steps, to.residual_evaluations += c.residual_evaluations, to.factorisations += c.factorisations;
+    to.newton_iterations += c.newton_iterations, to.error_test_failures += c.error_test_failures;
+    to.convergence_failures += c.convergence_failures;
+  }
+
+  int size() const override { return equations_.size(); }
+  VectorXd differential() const override {
+    VectorXd id = VectorXd::Zero(size());
+    id.head(equations_.motion()).setOnes();
+    id.tail(equations_.energies()).setOnes();
+    return id;
+  }
+  void residual(double t, const double* y, const double* y_dot, double* F) override {
+    equations_.residual(t, y, y_dot, memory_, F);
+  }
+  void newton_matrix(double t, double c, const double* y, const double* y_dot, double* values) override {
+    assembly_.begin(values);
+    equations_.newton(t, c, y, y_dot, memory_, assembly_);
+  }
+  std::span<const int> column_starts() const override { return assembly_.starts(); }
+  std::span<const int> rows() const override { return assembly_.rows(); }
+  void weights(double* w) const override { scales_->weights(w); }
+  int roots() const override { return static_cast<int>(contacts_.size() + laws_.switches().size()); }
+  void root_values(double t, const double* y, double* values) override {
+    // Round-off of a gap must not look like a crossing: it counts as on the side of the flag.
+    constexpr double round_off = 2e-16;
+    for (size_t i = 0; i < contacts_.size(); ++i) {
+      const double g = gap(i, y).value;
+      const double side = contacts_.closed()[i] ? round_off : -round_off;
+      values[i] = !contacts_.armed()[i] ? 1.0 : std::abs(g) <= round_off ? side : g;
+    }
+    Consistent at(*this, t, y);
+    for (size_t i = 0; i < laws_.switches().size(); ++i) {
+      const double side = laws_.sides()[i] ? round_off : -round_off;
+      const double g = laws_.armed()[i] ? switch_gap(laws_.switches()[i], at, y, false).value : 1.0;
+      values[contacts_.size() + i] = std::abs(g) <= round_off_of(laws_.switches()[i]) ? side : g;
+    }
+  }
+
+  /// Where nothing else keeps a gap off zero after its crossing.
+  static double round_off_of(const LawSwitch& s) {
+    using Kind = LawSwitch::Kind;
+    return s.kind == Kind::ramp || s.kind == Kind::latch || s.kind == Kind::faster ? 1e-14 : 1e-300;
+  }
+
+  /// Accelerations and multipliers at a state of the method; found when they are asked for.
+  struct Consistent {
+    MultipliersFlight& flight;
+    double t;
+    VectorXd y, y_dot;
+
+    Consistent(MultipliersFlight& of, double time, const double* state)
+        : flight(of), t(time), y(Eigen::Map<const VectorXd>(state, of.size())) {}
+    void find() {
+      if (y_dot.size() == 0) flight.equations_.make_consistent(t, y, y_dot, flight.memory_);
+    }
+    double hold(size_t joint) {
+      find();
+      const int row = flight.equations_.holding(joint);
+      return row < 0 ? 0 : y[row];
+    }
+    double acceleration(size_t joint) {  // by the change of the rate over a short time
+      constexpr double h = 1e-7;
+      find();
+      const auto rate = [&](double dt) {
+        return flight.equations_.gap(joint, (y + dt * y_dot).eval().data(), flight.memory_.near[joint]).rate;
+      };
+      return (rate(h) - rate(-h)) / (2 * h);
+    }
+  };
+
+  Gap switch_gap(const LawSwitch& s, Consistent& at, const double* y, bool slopes) {
+    const size_t joint = laws_.joint_of(s);
+    const DriveMotion<double> c = equations_.gap(joint, y, memory_.near[joint]);
+    LawPoint p{c.value, c.rate};
+    if (Laws::needs_hold(s)) p.hold = at.hold(joint);
+    if (slopes && Laws::needs_acceleration(s)) p.acceleration = at.acceleration(joint);
+    return laws_.gap(s, p);
+  }
+
+  DriveMotion<double> gap(size_t stop, const double* y) {
+    const size_t joint = contacts_.stop(stop).joint;
+    return equations_.gap(joint, y, memory_.near[joint]);
+  }
+  Gap gap(size_t stop) override {
+    const DriveMotion<double> g = gap(stop, y_.data());
+    return {g.value, g.rate};
+  }
+
+  /// By the change of the rate over a short time.
+  Push push(size_t stop, std::span<const char> closed) override {
+    constexpr double h = 1e-7;
+    VectorXd y = y_;
+    JointMemory memory = memory_;
+    set_closed(closed, memory);
+    VectorXd y_dot;
+    equations_.make_consistent(t_, y, y_dot, memory);
+    const double before = gap(stop, (y - h * y_dot).eval().data()).rate,
+                 after = gap(stop, (y + h * y_dot).eval().data()).rate;
+    return {(after - before) / (2 * h), 0};
+  }
+
+  Gap joint_way(size_t joint) override {
+    const DriveMotion<double> c = equations_.gap(joint, y_.data(), memory_.near[joint]);
+    return {c.value, c.rate};
+  }
+  double joint_acceleration(size_t joint) override { return Consistent(*this, t_, y_.data()).acceleration(joint); }
+  double hold_load(size_t joint) override { return Consistent(*this, t_, y_.data()).hold(joint); }
+  void lose(size_t joint, LawLoss loss, double energy) override {
+    y_[equations_.losses(joint) + 1 + static_cast<int>(loss)] += energy;
+  }
+
+  /// A joint that is held has a row more, or one less when it is let go.
+  void take_branches() override {
+    memory_.laws.assign(laws_.branches().begin(), laws_.branches().end());
+    bool other_rows = false;
+    for (size_t i = 0; i < laws_.size(); ++i) {
+      const size_t joint = laws_.joint(i);
+      const bool held = memory_.laws[joint].held;
+      if (held == equations_.joints()[joint].held_at.has_value()) continue;
+      const double at = joint_way(joint).value + scene_.joints[joint].mechanism.threshold;
+      equations_.hold(joint, held ? std::optional(at) : std::nullopt);
+      other_rows = true;
+    }
+    if (other_rows) choose_rows();
+  }
+
+  /// Numbers the unknowns anew; IDA, where there is one, starts with them again.
+  void choose_rows() {
+    const VectorXd motion = y_.head(equations_.motion()), energies = y_.tail(equations_.energies());
+    const RankReport rank = constraint_rank(equations_, t_, y_.data());
+    margin_ = rank.margin;
+    equations_.keep_rows(rank.kept);
+    y_ = VectorXd::Zero(equations_.size());
+    y_.head(motion.size()) = motion, y_.tail(energies.size()) = energies;
+    renumbered_ = true;
+  }
+
+  /// Everything is affine in a load: what a load makes of accelerations, an impulse makes of rates. The load is as
+  /// large as the others, else its part were round-off.
+  void prepare_blow(size_t joint) override {
+    Consistent before(*this, t_, y_.data());
+    before.find();
+    const double others = before.y_dot.head(equations_.motion()).cwiseAbs().maxCoeff();
+    double load = 1;
+    for (int round = 0; round < 2; ++round) {
+      memory_.laws[joint].spring = laws_.branches()[joint].spring + load;
+      Consistent after(*this, t_, y_.data());
+      after.find();
+      memory_.laws[joint].spring = laws_.branches()[joint].spring;
+      blow_ = (after.y_dot - before.y_dot) / load;
+      held_blow_ = (after.y - before.y) / load;
+      load = 1e3 * (1 + others) / std::abs(rate_of_blow(joint));
+    }
+  }
+  double rate_of_blow(size_t joint) override {  // rates are linear in the velocities
+    const VectorXd after = y_ + blow_;
+    return equations_.gap(joint, after.data(), memory_.near[joint]).rate - joint_way(joint).rate;
+  }
+  double hold_of_blow(size_t joint) override {
+    const int row = equations_.holding(joint);
+    return row < 0 ? 0 : held_blow_[row];
+  }
+  void strike(double impulse) override { y_ += impulse * blow_; }
+
+  double noise(size_t stop) const override {
+    constexpr double of_steps = 3, round_off = 1e-14;
+    return std::max(round_off, of_steps * local_share * options_.tolerance * contacts_.largest_gap(stop));
+  }
+
+  void set_closed(std::span<const char> closed, JointMemory& memory) const {
+    for (size_t i = 0; i < contacts_.size(); ++i) memory.closed[contacts_.stop(i).joint] = closed[i];
+  }
+
+  void check_sizes(const std::vector<BodyState>& start) const {
+    require(start.size() == scene_.bodies.size(),
+            fmt::format("{} bodies need as many states, {} were given", scene_.bodies.size(), start.size()));
+    for (size_t i = 0; i < start.size(); ++i)
+      for (const VectorXd* q : {&start[i].q, &start[i].q_dot})
+        require(q->size() == 0 || q->size() == scene_.bodies[i].n(),
+                fmt::format("body \"{}\" has {} elastic coordinates, {} were given", scene_.bodies[i].name,
+                            scene_.bodies[i].n(), q->size()));
+  }
+
+  void start_on_constraints(const std::vector<BodyState>& start) {
+    y_ = equations_.pack(start);
+    require(y_.allFinite(), "the start state is not finite");
+    Equations::RowValues values;
+    equations_.row_values(t_, y_.data(), values);
+    require_closed(violation(equations_, values.g), "m", "rad", "is open by");
+    check_branches(equations_, t_, y_.data());
+    const RankReport rank = constraint_rank(equations_, t_, y_.data());
+    for (const RowName& n : rank.left_out) result_.summary.redundant.push_back(describe(equations_, n));
+    margin_ = rank.margin;
+    equations_.keep_rows(rank.kept);
+    y_ = equations_.pack(start);
+    y_[equations_.dissipated()] = options_.dissipated, y_[equations_.work()] = options_.work;
+    for (size_t i = 0; i < options_.lost.size(); ++i)
+      for (size_t k = 0; k < options_.lost[i].size(); ++k)
+        y_[equations_.losses(i) + static_cast<int>(k)] = options_.lost[i][k];
+    equations_.project(t_, y_);
+    equations_.row_values(t_, y_.data(), values);
+    require_closed(violation(equations_, values.g_dot), "m/s", "rad/s",
+                   "can not follow: its motion is prescribed against other joints', by");
+    rows_ = rates_ = VectorXd::Zero(equations_.all_rows());
+  }
+
+  void require_closed(const Violation& v, const char* metres, const char* radians, const char* what) const {
+    const bool place = v.position > open_joint + frame_->round_off();
+    if (!place && !(v.angle > open_joint)) return;
+    throw InputError(fmt::format("{}: it {} {:.3g} {} at the start; see close_joints",
+                                 describe(equations_, place ? v.worst_position : v.worst_angle), what,
+                                 place ? v.position : v.angle, place ? metres : radians));
+  }
+
+  /// Angles near what was asked for.
+  void begin_contacts() {
+    for (size_t i = 0; i < scene_.joints.size(); ++i) {
+      const HingeMechanism& m = scene_.joints[i].mechanism;
+      const double angle = options_.angles.empty() ? m.rest : options_.angles[i];
+      memory_.near[i] = angle - m.threshold;
+    }
+    follow_turns();
+    contacts_.begin(*this);
+    set_closed(contacts_.closed(), memory_);
+    if (laws_.empty()) return;
+    laws_.begin(*this, t_, result_.events);
+    equations_.project(t_, y_);
+  }
+
+  void follow_turns() {
+    for (size_t i = 0; i < scene_.joints.size(); ++i)
+      if (scene_.joints[i].kind == JointKind::hinge)
+        memory_.near[i] = equations_.gap(i, y_.data(), memory_.near[i]).value;
+  }
+
+  void record_pattern() {
+    equations_.newton(t_, 1, y_.data(), y_dot_.data(), memory_, assembly_);
+    assembly_.finish(size(), options_.linear_solver == "dense");
+  }
+
+  void restart() override {
+    set_closed(contacts_.closed(), memory_);
+    if (renumbered_) make_method();
+    if (t_ > options_.start) {
+      equations_.project(t_, y_);
+      equations_.make_consistent(t_, y_, y_dot_, memory_);
+    }
+    ida_->restart(t_, y_, y_dot_);
+  }
+
+  void step(double limit, double& t, VectorXd& y) override {
+    before_.resize(static_cast<size_t>(roots()));
+    for (size_t i = 0; i < contacts_.size(); ++i) before_[i] = clearance(i, y);
+    for (size_t i = 0; i < laws_.switches().size(); ++i) before_[contacts_.size() + i] = switch_clearance(i, y);
+    const double t0 = t;
+    std::vector<int>& crossed = contacts_.crossed();
+    crossed_.assign(static_cast<size_t>(roots()), 0);
+    try {
+      ida_->step(limit, t, y, crossed_);
+      std::copy_n(crossed_.begin(), crossed.size(), crossed.begin());
+    } catch (const NumericalError& error) {
+      if (constraint_rank(equations_, t, y.data()).margin < 3e-2 * margin_) throw_locked(t, y);
+      const std::string body = body_without_inertia(equations_, t, y.data());
+      if (!body.empty()) throw NumericalError(fmt::format("t = {:.9g} s: {}", t, body));
+      throw;
+    }
+    if (std::ranges::all_of(crossed_, [](int c) { return c == 0; })) find_short_contacts(t0, t, y);
+    // Only a crossing away from where the flag is counts: the state may lie a rounding error behind the stop.
+    for (size_t i = 0; i < contacts_.size(); ++i) {
+      const double rate = gap(i, y.data()).rate;
+      const bool counts = crossed[i] != 0 && (contacts_.closed()[i] ? rate < 0 : rate > 0);
+      crossed[i] = !counts ? 0 : contacts_.closed()[i] ? -1 : 1;
+    }
+    for (size_t i = 0; i < laws_.switches().size(); ++i) {
+      const int direction = crossed_[contacts_.size() + i], away = laws_.sides()[i] ? -1 : 1;
+      laws_.crossed()[i] = laws_.armed()[i] && direction == away ? away : 0;
+    }
+    watch_constraints(t, y);
+  }
+
+  [[noreturn]] void throw_locked(double t, const VectorXd& y) {
+    throw NumericalError(fmt::format("joint \"{}\" locks at t = {:.6g} s: the joints leave no consistent velocity",
+                                     locked_joint(equations_, t, y.data()), t));
+  }
+
+  /// Drift, rows that were left out, and whether the constraints are still independent.
+  void watch_constraints(double t, const VectorXd& y) {
+    equations_.row_violations(t, y.data(), rows_.data(), rates_.data());
+    const Violation g = violation(equations_, rows_), g_dot = violation(equations_, rates_);
+    MultipliersSummary& s = result_.summary;
+    s.position_drift = std::max(s.position_drift, g.position);
+    s.angle_drift = std::max(s.angle_drift, g.angle);
+    s.velocity_drift = std::max(s.velocity_drift, g_dot.position);
+    s.angular_velocity_drift = std::max(s.angular_velocity_drift, g_dot.angle);
+    for (const BodyPlaces& at : equations_.places())
+      s.quaternion_drift = std::max(s.quaternion_drift, std::abs(y.segment<4>(at.p).norm() - 1));
+    if (std::max(g.position, g.angle) > 1e-6 + options_.tolerance) {
+      const RowName worst = g.position > g.angle ? g.worst_position : g.worst_angle;
+      throw NumericalError(fmt::format(
+          "{}: violated by {:.3g} at t = {:.6g} s; it depended on other joints at the start and does so no more",
+          describe(equations_, worst), std::max(g.position, g.angle), t));
+    }
+    if (steps() % 16 == 0 && constraint_rank(equations_, t, y.data()).margin < 1e-7 * margin_) throw_locked(t, y);
+  }
+
+  Clearance clearance(size_t i, const VectorXd& y) {
+    const double side = contacts_.closed()[i] ? 1 : -1;
+    const DriveMotion<double> g = gap(i, y.data());
+    return {0, side * g.value, side * g.rate};
+  }
+
+  /// Of a switch that goes by the way alone; others have no short crossings worth looking for.
+  Clearance switch_clearance(size_t i, const VectorXd& y) {
+    const LawSwitch& s = laws_.switches()[i];
+    if (!laws_.armed()[i] || Laws::needs_hold(s) || Laws::needs_acceleration(s)) return {0, 1, 0};
+    Consistent unused(*this, 0, y.data());
+    const Gap g = switch_gap(s, unused, y.data(), false);
+    const double side = laws_.sides()[i] ? 1 : -1;
+    return {0, side * g.value, side * g.rate};
+  }
+
+  /// IDA looks at the signs at both ends of a step: a contact that begins and ends within it is found here.
+  void find_short_contacts(double t0, double& t, VectorXd& y) {
+    const double length = t - t0;
+    double first = length;
+    for (size_t i = 0; i < before_.size(); ++i) {
+      const bool of_law = i >= contacts_.size();
+      const size_t k = of_law ? i - contacts_.size() : i;
+      const auto clear = [&](const VectorXd& state) {
+        return of_law ? switch_clearance(k, state) : clearance(k, state);
+      };
+      if (!(of_law ? laws_.armed()[k] : contacts_.armed()[k]) || !(before_[i].slope < 0)) continue;
+      Clearance to = clear(y);
+      to.c = length;
+      if (!(to.slope > 0) || to.value < 0) continue;
+      const auto at = [&](double c) {
+        sample_.resize(size());
+        ida_->interpolate(t0 + c, sample_);
+        Clearance here = clear(sample_);
+        here.c = c;
+        return here;
+      };
+      const double root = crossing_between(at, before_[i], to, 4e-16 * t);
+      // At round-off of the gap it may be no crossing to those who look at the rate: then the step ends where it ended,
+      // for the next one starts there.
+      if (root >= first || !(at(root).slope < 0)) continue;
+      std::ranges::fill(crossed_, 0);
+      crossed_[i] = (of_law ? laws_.sides()[k] : contacts_.closed()[k]) ? -1 : 1;
+      first = root;
+    }
+    if (first == length) return;
+    std::copy_n(crossed_.begin(), contacts_.size(), contacts_.crossed().begin());
+    t = t0 + first;
+    ida_->interpolate(t, y);
+  }
+
+  void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override {
+    sample_.resize(size());
+    for (size_t i = 0; i < times.size(); ++i) {
+      ida_->interpolate(times[i], sample_);
+      Y.col(static_cast<Eigen::Index>(i)) = sample_;
+    }
+  }
+
+  void observe(const VectorXd& y) override {
+    scales_->observe(y);
+    follow_turns();
+  }
+
+  void keep_rows(size_t rows) override { result_.states.resize(rows), result_.balance.resize(rows); }
+
+  /// Multipliers of an output are those of its motion, not interpolated.
+  void record(double t, VectorXd y) override {
+    VectorXd y_dot;
+    equations_.make_consistent(t, y, y_dot, memory_);
+    MultibodyState s;
+    s.bodies = equations_.unpack(y.data());
+    for (const BodyPlaces& at : equations_.places())
+      s.accelerations.push_back({y_dot.segment<3>(at.v), y_dot.segment<3>(at.w)});
+    for (size_t i = 0; i < scene_.joints.size(); ++i) {
+      const JointKind kind = scene_.joints[i].kind;
+      DriveMotion<double> c;
+      if (kind == JointKind::hinge || kind == JointKind::slider) c = equations_.gap(i, y.data(), memory_.near[i]);
+      s.coordinate.push_back(c.value + scene_.joints[i].mechanism.threshold);
+      s.rate.push_back(c.rate);
+    }
+    s.loads = equations_.loads(t, y.data());
+    for (size_t i = 0; i < scene_.wheels.size(); ++i) {
+      const ReactionWheel& w = scene_.wheels[i];
+      s.spin.push_back(y[equations_.wheel(i)] / w.inertia - w.axis.dot(s.bodies[static_cast<size_t>(w.body)].omega));
+    }
+    s.ledger = equations_.ledger(y.data(), memory_);
+    s.work = y[equations_.work()], s.dissipated = s.ledger.lost();
+    s.lost.resize(scene_.joints.size());
+    for (size_t i = 0; i < scene_.joints.size(); ++i)
+      if (const int first = equations_.losses(i); first >= 0)
+        s.lost[i].assign(y.data() + first, y.data() + first + 1 + (equations_.joints()[i].law ? law_losses.size() : 0));
+    s.laws = memory_.laws;
+    Balance balance = balance_of(equations_, y, memory_);
+    frame_->leave(t, s, balance);
+    result_.time.push_back(t);
+    result_.states.push_back(std::move(s));
+    result_.balance.push_back(balance);
+  }
+
+  void finish() override {
+    MultipliersSummary& s = result_.summary;
+    DaeCounts c = past_;
+    add(ida_->counts(), c);
+    s.steps = c.steps, s.residual_evaluations = c.residual_evaluations, s.factorisations = c.factorisations;
+    s.newton_iterations = c.newton_iterations, s.error_test_failures = c.error_test_failures;
+    s.convergence_failures = c.convergence_failures;
+    set_drifts(scene_, options_.largest, result_);
+  }
+
+  Equations& equations_;
+  const Multibody& scene_;
+  const MultipliersOptions& options_;
+  double margin_ = 1;
+  JointMemory memory_;
+  std::vector<Clearance> before_;  // of the stops and switches, before the step
+  std::vector<int> crossed_;       // the same
+  bool renumbered_ = false;
+  DaeCounts past_;
+  VectorXd y_dot_, sample_, rows_, rates_;
+  VectorXd blow_, held_blow_;  // changes of the state and of multipliers per impulse
+  redundant::PatternSum assembly_;
+  std::unique_ptr<FlightFrame> frame_;
+  std::unique_ptr<StateScales> scales_;
+  std::unique_ptr<Ida> ida_;
+};
+
+}  // namespace
+
+MultibodyTrajectory integrate_multipliers(const Multipliers& system, const std::vector<BodyState>& start,
+                                          const MultipliersOptions& options,
+                                          const Checkpoint<MultibodyTrajectory>& so_far) {
+  check_options(options, system.multibody().joints.size());
+  require(options.angles.empty() || options.angles.size() == system.multibody().joints.size(),
+          "one angle per joint is needed");
+  if (system.multibody().field) system.multibody().field->orbit.at(options.duration);  // does it last so long?
+  Equations equations(system.impl());
+  return MultipliersFlight(system, equations, start, options, so_far).fly();
+}
+
+}  // namespace flexboom

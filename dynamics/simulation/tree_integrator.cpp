@@ -1,0 +1,362 @@
+#include "dynamics/simulation/tree_integrator.hpp"
+
+#include "dynamics/events/conservation.hpp"
+#include "dynamics/events/event_loop.hpp"
+#include "dynamics/methods/error_scales.hpp"
+#include "dynamics/methods/ode.hpp"
+#include "dynamics/relative/split.hpp"
+#include "fem/base/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace flexboom {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+std::vector<Stop> stops_of(const Tree& tree) {
+  std::vector<Stop> stops;
+  for (const int joint : tree.stops()) {
+    const Joint& j = tree.scene().joints[static_cast<size_t>(joint)];
+    stops.push_back(stop_of(j, static_cast<size_t>(joint), tree.scene().bodies[static_cast<size_t>(j.b.body)]));
+  }
+  return stops;
+}
+
+/// Does exponential collocation suit a flight? By how long its steps become beside the fastest linear motion, in its
+/// first steps.
+class Pilot {
+ public:
+  /// After a step. @throws Unsuitable.
+  void observe(double step, double fastest) {
+    if (suits_) return;
+    turned_ = std::max(turned_, step * fastest), fastest_ = fastest;
+    suits_ = turned_ >= enough;
+    if (!suits_ && ++steps_ == steps) throw Unsuitable{fastest};
+  }
+  std::string why() const {
+    return suits_ ? fmt::format("its steps pass {:.2g} rad of the fastest motion, {:.3g} rad/s", turned_, fastest_)
+                  : "the flight takes few steps";
+  }
+
+  /// No failure: nothing of the flight is kept.
+  struct Unsuitable {
+    double fastest;  // [rad/s]
+    std::string why() const {
+      return fmt::format("what is nonlinear sets the steps: no linear motion is faster than {:.2g} rad/s", fastest);
+    }
+  };
+
+ private:
+  static constexpr int steps = 50;
+  static constexpr double enough =
+      0.1;  // of a radian: shorter steps are those of any method, and others do less in one
+  int steps_ = 0;
+  double turned_ = 0, fastest_ = 0;
+  bool suits_ = false;
+};
+
+class TreeFlight final : public Flight<TreeTrajectory> {
+ public:
+  TreeFlight(const Tree& tree, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method,
+             const Checkpoint<TreeTrajectory>& so_far, Pilot* pilot = nullptr)
+      : Flight(options, so_far, stops_of(tree), tree.scene().joints.size(), Laws(tree.scene().joints, options)),
+        tree_(tree),
+        scales_(tree, y0, method.local_share * options.tolerance, options.rescale_at_events),
+        ode_(ode_of(tree, laws_)),
+        stepper_(method.make != nullptr ? method.make(ode_of(tree, laws_), scales_.error())
+                                        : method.make_split(split(tree), scales_.error())),
+        exact_in_linear_part_(method.make_split != nullptr),
+        pilot_(pilot),
+        work_(tree.workspace()),
+        has_stiffening_(
+            std::ranges::any_of(tree.scene().bodies, [](const ReducedBody& b) { return !b.Kg.spin.empty(); })),
+        effect_(tree.scene().bodies.size()),
+        y_dot_(y0.size()),
+        flags_(contacts_.closed()),
+        armed_(contacts_.armed()),
+        crossed_(contacts_.size() + laws_.switches().size(), 0) {
+    y_ = y0;
+    result_.summary.method = method.name;
+    for (size_t i = 0; i < contacts_.size() && !options.rescale_at_events; ++i)
+      scales_.raise(scalar(i), contacts_.largest_gap(i));
+    contacts_.begin(*this);
+    laws_.begin(*this, t_, result_.events);
+  }
+
+ private:
+  Gap gap(size_t stop) override {
+    return {tree_.gap(y_.data(), tree_.stops()[stop]), tree_.gap_rate(y_.data(), tree_.stops()[stop])};
+  }
+
+  /// Stiff modes make a push of what the method's error leaves open of them.
+  Push push(size_t stop, std::span<const char> closed) override {
+    const ErrorScale& error = scales_.error();
+    const double here = acceleration(stop, closed, y_);
+    return {here, std::abs(acceleration(stop, closed, y_ + error.tolerance * error.scale) - here)};
+  }
+
+  double acceleration(size_t stop, std::span<const char> closed, const VectorXd& y) {
+    ode_->derivative(t_, y.data(), closed, y_dot_.data());
+    return ode_->gap_rate(y_dot_.data(), static_cast<int>(stop));
+  }
+
+  /// The exponential method has no error in what a hinge does when it hardly moves.
+  double noise(size_t stop) const override {
+    const ErrorScale& error = scales_.error();
+    const double of_steps = noise_of_methods * error.tolerance * error.scale[scalar(stop)];
+    return exact_in_linear_part_ ? std::min(of_steps, 1e-14 * contacts_.largest_gap(stop)) : of_steps;
+  }
+
+  void put_on_stop(size_t stop) override { y_[scalar(stop)] = 0; }
+
+  int scalar(size_t stop) const { return tree_.layout().joints[static_cast<size_t>(tree_.stops()[stop])].scalar; }
+
+  Gap joint_way(size_t joint) override {
+    const int i = static_cast<int>(joint);
+    return {tree_.gap(y_.data(), i), tree_.gap_rate(y_.data(), i)};
+  }
+  double joint_acceleration(size_t joint) override {
+    evaluate(laws_.branches());
+    return tree_.gap_rate(y_dot_.data(), static_cast<int>(joint));
+  }
+  double hold_load(size_t joint) override {
+    evaluate(laws_.branches());
+    return tree_.hold_load(static_cast<int>(joint), y_.data(), *work_);
+  }
+  void put(size_t joint, double x) override { y_[tree_.layout().joints[joint].scalar] = x; }
+  void put_to_rest(size_t joint) override { y_[tree_.layout().rate(tree_.layout().joints[joint].scalar)] = 0; }
+  void lose(size_t joint, LawLoss loss, double energy) override {
+    y_[tree_.layout().joints[joint].losses + static_cast<int>(loss)] += energy;
+  }
+
+  /// Everything is affine in a load: what a load makes of accelerations, an impulse makes of rates. The load is as
+  /// large as the others, else its part were round-off.
+  void prepare_blow(size_t joint) override {
+    std::vector<LawBranch> loaded(laws_.branches().begin(), laws_.branches().end());
+    std::vector<double> hold(loaded.size(), 0.0);
+    evaluate(laws_.branches());
+    const VectorXd before = y_dot_;
+    for (size_t i = 0; i < hold.size(); ++i)
+      if (loaded[i].held) hold[i] = tree_.hold_load(static_cast<int>(i), y_.data(), *work_);
+    double load = 1;
+    for (int round = 0; round < 2; ++round) {
+      loaded[joint].spring = laws_.branches()[joint].spring + load;
+      evaluate(loaded);
+      blow_ = (y_dot_ - before) / load;
+      hold_of_blow_.assign(hold.size(), 0.0);
+      for (size_t i = 0; i < hold.size(); ++i)
+        if (loaded[i].held)
+          hold_of_blow_[i] = (tree_.hold_load(static_cast<int>(i), y_.data(), *work_) - hold[i]) / load;
+      load = 1e3 * (1 + before.cwiseAbs().maxCoeff()) / std::abs(rate_of_blow(joint));
+    }
+  }
+  double rate_of_blow(size_t joint) override { return tree_.gap_rate(blow_.data(), static_cast<int>(joint)); }
+  double hold_of_blow(size_t joint) override { return hold_of_blow_[joint]; }
+  void strike(double impulse) override { y_ += impulse * blow_; }
+
+  void evaluate(std::span<const LawBranch> laws) {
+    const TreeLayout& l = tree_.layout();
+    std::vector<char> contact(l.joints.size(), 0);
+    for (size_t i = 0; i < contacts_.size(); ++i) contact[contacts_.stop(i).joint] = contacts_.closed()[i];
+    tree_.derivative(t_, y_.data(), contact, *work_, y_dot_.data(), laws);
+  }
+
+  /// Stops come before the switches of laws.
+  void restart() override {
+    const auto both = [](const std::vector<char>& stops, const std::vector<char>& laws, std::vector<char>& all) {
+      all = stops;
+      all.insert(all.end(), laws.begin(), laws.end());
+    };
+    both(contacts_.closed(), laws_.sides(), flags_), both(contacts_.armed(), laws_.armed(), armed_);
+    const bool starts = t_ == options_.start;
+    if (!starts) {
+      for (const TreeLayout::Joint& j : tree_.layout().joints)
+        if (j.attitude >= 0) y_.segment<4>(j.attitude).normalize();
+      scales_.restart(y_);
+    }
+    stepper_->restart(t_, y_, flags_, armed_);
+    if (starts) stepper_->predict(options_.duration, [this](const VectorXd& y) { scales_.predict(y); });
+  }
+  void step(double limit, double& t, VectorXd& y) override {
+    stepper_->step(limit, t, y, crossed_);
+    if (pilot_ != nullptr) pilot_->observe(t - t_, stepper_->fastest());
+    const auto stops = static_cast<std::ptrdiff_t>(contacts_.size());
+    std::copy(crossed_.begin(), crossed_.begin() + stops, contacts_.crossed().begin());
+    std::copy(crossed_.begin() + stops, crossed_.end(), laws_.crossed().begin());
+  }
+  void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override { stepper_->interpolate_all(times, Y); }
+  void observe(const VectorXd& y) override { scales_.observe(y); }
+  void keep_rows(size_t rows) override {
+    result_.y.resize(rows), result_.balance.resize(rows);
+    if (!laws_.empty()) result_.laws.resize(rows);
+  }
+
+  void record(double t, VectorXd y) override {
+    for (const TreeLayout::Joint& j : tree_.layout().joints) {
+      if (j.attitude < 0) continue;
+      auto attitude = y.segment<4>(j.attitude);
+      result_.summary.constraint_drift = std::max(result_.summary.constraint_drift, std::abs(attitude.norm() - 1));
+      attitude.normalize();
+    }
+    tree_.impose(t, y);
+    result_.balance.push_back(tree_.balance(t, y, *work_));
+    if (t == output_time()) look_at_stiffening(t, y);
+    result_.time.push_back(t);
+    result_.y.push_back(std::move(y));
+    if (!laws_.empty()) result_.laws.emplace_back(laws_.branches().begin(), laws_.branches().end());
+  }
+
+  /// At every output of a short list, at some of a long one: an eigenvalue problem for each body.
+  void look_at_stiffening(double t, const VectorXd& y) {
+    if (!has_stiffening_) return;
+    const double outputs = (options_.duration - options_.start) / options_.output_step;
+    const auto stride = static_cast<size_t>(outputs / 500) + 1;
+    if (result_.time.size() % stride != 0) return;
+    std::vector<char> contact(tree_.scene().joints.size(), 0);
+    for (size_t i = 0; i < contacts_.size(); ++i) contact[contacts_.stop(i).joint] = contacts_.closed()[i];
+    flexboom::observe(tree_.stiffening_effect(t, y, contact, laws_.branches()), t, effect_);
+  }
+
+  void finish() override {
+    constexpr double digits = 1e-12;  // what is left of a potential energy that hardly changes
+    IntegrationSummary& s = result_.summary;
+    add_counts(stepper_->counts(), s);
+    Conservation kept(tree_.scene().bodies, options_.largest);
+    for (const Balance& b : result_.balance)
+      kept.add(
+          b.energy(),
+          std::max({b.kinetic + std::abs(b.elastic), std::abs(b.work), b.dissipated, digits * std::abs(b.potential)}),
+          b);
+    s.largest = kept.largest();
+    s.energy_balance = kept.energy_balance();
+    if (is_isolated(tree_.scene())) s.momentum_drift = kept.momentum_drift();
+    result_.stiffening_effect = effect_;
+    result_.warnings = stiffening_warnings(tree_.scene(), effect_, options_.tolerance,
+                                           [this](int body) { return tree_.stiffening(body); });
+  }
+
+  const Tree& tree_;
+  ErrorScales scales_;
+  std::unique_ptr<Ode> ode_;
+  std::unique_ptr<Stepper> stepper_;
+  bool exact_in_linear_part_;
+  Pilot* pilot_;
+  TreeWorkspaceHandle work_;
+  bool has_stiffening_;                    // has any body a Kg?
+  std::vector<LargestStiffening> effect_;  // per body
+  VectorXd y_dot_, blow_;                  // blow: change of the state per impulse
+  std::vector<double> hold_of_blow_;       // per joint
+  std::vector<char> flags_, armed_;        // of stops and switches
+  std::vector<int> crossed_;
+};
+
+}  // namespace
+
+void observe(const std::vector<StiffeningEffect>& effect, double t, std::vector<LargestStiffening>& largest) {
+  for (size_t b = 0; b < effect.size(); ++b) {
+    largest[b].size = std::max(largest[b].size, effect[b].size);
+    if (effect[b].softening > largest[b].softening) largest[b].softening = effect[b].softening, largest[b].time = t;
+  }
+}
+
+std::vector<std::string> stiffening_warnings(const Multibody& scene, const std::vector<LargestStiffening>& effect,
+                                             double tolerance, const std::function<Stiffening(int body)>& stiffening) {
+  std::vector<std::string> warnings;
+  for (size_t b = 0; b < effect.size(); ++b) {
+    const std::string& name = scene.bodies[b].name;
+    if (effect[b].size > tolerance && stiffening(static_cast<int>(b)) == Stiffening::off)
+      warnings.push_back(
+          fmt::format("body {}: its geometric stiffness is off; it reaches {:.2g} of its stiffness, more than the "
+                      "tolerance {:.2g}{}",
+                      name, effect[b].size, tolerance,
+                      effect[b].size > 0.1 ? ": without it the motion can be wrong or diverge" : ""));
+    if (effect[b].softening > 1)
+      warnings.push_back(
+          fmt::format("body {}: at t = {:.6g} s its geometric stiffness takes {:.2g} of its stiffness "
+                      "away: it buckles, and what follows is beyond the theory",
+                      name, effect[b].time, effect[b].softening));
+  }
+  return warnings;
+}
+
+namespace {
+
+std::span<const LawBranch> laws_at(const TreeTrajectory& flight, size_t row) {
+  return flight.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(flight.laws[row]);
+}
+
+}  // namespace
+
+std::vector<LargestStiffening> largest_stiffening(const Tree& tree, const TreeTrajectory& flight) {
+  std::vector<LargestStiffening> largest(tree.scene().bodies.size());
+  const size_t stride = flight.y.size() / 500 + 1;
+  for (size_t row = 0; row < flight.y.size(); row += stride) {
+    const VectorXd& y = flight.y[row];
+    observe(tree.stiffening_effect(flight.time[row], y, closed_stops(tree, y), laws_at(flight, row)), flight.time[row],
+            largest);
+  }
+  return largest;
+}
+
+std::vector<char> closed_stops(const Tree& tree, const Eigen::Ref<const VectorXd>& y) {
+  std::vector<char> closed(tree.scene().joints.size(), 0);
+  for (const int joint : tree.stops()) closed[static_cast<size_t>(joint)] = tree.gap(y.data(), joint) > 0;
+  return closed;
+}
+
+TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o,
+                         const Checkpoint<TreeTrajectory>& so_far) {
+  check_options(o, tree.scene().joints.size());
+  require(y0.size() == tree.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
+  if (tree.scene().field) tree.scene().field->orbit.at(o.duration);  // does it last so long?
+  const bool has_laws = std::ranges::any_of(tree.scene().joints, [](const Joint& j) { return j.law.given(); });
+  require(!has_laws || o.method == "auto" || integrator_method(o.method).make != nullptr,
+          fmt::format("method '{}' simulates no laws of joints; 'adams', 'bdf', 'dirk' and 'erk' do", o.method));
+  VectorXd start = y0;
+  tree.impose(o.start, start);
+  const auto fly = [&](const std::string& method, const std::string& why) {
+    TreeTrajectory r = TreeFlight(tree, start, o, integrator_method(method), so_far).fly();
+    r.summary.why_method = why;
+    return r;
+  };
+  if (o.method != "auto") return fly(o.method, "");
+  if (has_laws) return fly("bdf", "joints have laws");
+  try {
+    Pilot pilot;
+    TreeTrajectory r = TreeFlight(tree, start, o, integrator_method("exponential"), so_far, &pilot).fly();
+    r.summary.why_method = pilot.why();
+    return r;
+  } catch (const Pilot::Unsuitable& reason) {
+    const bool cheap = tree.layout().p + tree.layout().u <= 12;  // less than what a multistep method does beside it
+    return fly(cheap ? "erk" : "adams", reason.why());
+  } catch (const MethodFailure& failure) {
+    return fly("bdf", fmt::format("exponential collocation could not: {}", failure.what()));
+  } catch (const InputError& failure) {
+    return fly("bdf", fmt::format("exponential collocation cannot: {}", failure.what()));
+  }
+}
+
+std::vector<Stiffening> stiffening_where_it_counts(const Multibody& scene, const TreeState& state, double duration,
+                                                   double tolerance) {
+  const Tree tree(scene);
+  VectorXd y = tree.pack(state);
+  const std::vector<char> open(scene.joints.size(), 0);
+  std::vector<Stiffening> choice(scene.bodies.size(), Stiffening::off);
+  constexpr int samples = 100;
+  for (int i = 0; i <= samples; ++i) {
+    const double t = duration * i / samples;
+    tree.impose(t, y);
+    const std::vector<StiffeningEffect> effect = tree.stiffening_effect(t, y, open);
+    for (size_t b = 0; b < effect.size(); ++b)
+      if (effect[b].size > tolerance) choice[b] = Stiffening::on;
+  }
+  return choice;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,51 @@
+#pragma once
+
+#include "dynamics/methods/integrator.hpp"
+#include "dynamics/relative/tree.hpp"
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// The largest StiffeningEffect of a body in a flight.
+struct LargestStiffening {
+  double size = 0, softening = 0;
+  double time = 0;  // of the largest softening [s]
+};
+void observe(const std::vector<StiffeningEffect>&, double t, std::vector<LargestStiffening>&);
+
+/// Names each body whose geometric stiffness is off although its effect exceeds the tolerance, or takes all stiffness
+/// away.
+std::vector<std::string> stiffening_warnings(const Multibody&, const std::vector<LargestStiffening>&, double tolerance,
+                                             const std::function<Stiffening(int body)>&);
+
+/// Per joint: is its stop closed where gaps alone say so?
+std::vector<char> closed_stops(const Tree&, const Eigen::Ref<const Eigen::VectorXd>& y);
+
+struct TreeTrajectory {
+  std::vector<double> time;
+  std::vector<Eigen::VectorXd> y;  // Tree::layout(), prescribed coordinates as prescribed
+  std::vector<Balance> balance;
+  std::vector<std::vector<LawBranch>> laws;  // per joint; empty where no joint has a law
+  std::vector<StopEvent> events;
+  IntegrationSummary summary;                        // momentum_drift: unknown where something holds or pushes
+  std::vector<LargestStiffening> stiffening_effect;  // per body, at the outputs
+  std::vector<std::string> warnings;
+};
+
+/// At the rows of a flight, of long ones at some.
+std::vector<LargestStiffening> largest_stiffening(const Tree&, const TreeTrajectory&);
+
+/// Flies the tree from y0. Method "auto": the one that suits its start, and bdf where that fails.
+/// @throws InputError for an unknown method or bad options; NumericalError when the method fails.
+TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const IntegratorOptions&,
+                         const Checkpoint<TreeTrajectory>& = {});
+
+/// For each body: on where the geometric stiffness exceeds `tolerance` of Ke at the start or, at rest relative to them,
+/// under the prescribed motions until `duration` [s].
+std::vector<Stiffening> stiffening_where_it_counts(const Multibody&, const TreeState&, double duration,
+                                                   double tolerance);
+
+}  // namespace flexboom

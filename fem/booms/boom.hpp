@@ -1,0 +1,44 @@
+#pragma once
+
+#include "fem/mesh/mesh.hpp"
+
+namespace flexboom {
+
+/// A straight piece of a boom. A taper is a piece whose end shape differs from its start shape.
+struct BeamSegment {
+  SectionShape start;
+  SectionShape end;
+  double length = 0;  // [m]
+  Material material;
+  int elements = 0;  // 0: chosen by make_mesh
+};
+
+/// A rigid body fixed to the boom at a distance `position` from the root. A lumped mass has zero inertia and offset.
+struct RigidAttachment {
+  std::string name;
+  double position = 0;                                // [m] along the boom
+  double mass = 0;                                    // [kg]
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // about its own mass centre, boom axes [kg m^2]
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();   // boom axis to its mass centre, boom axes [m]
+};
+
+/// A boom along +x of its body frame (BRF), root at the origin; y and z are the principal axes of every section.
+struct BeamGeometry {
+  std::vector<BeamSegment> segments;
+  std::vector<RigidAttachment> attachments;
+  BeamTheory theory = BeamTheory::timoshenko;
+  ShearRule shear;
+  bool rotary_inertia = true;  // false: line mass, no inertia of the section; torsion is then left out
+  int order = 4;               // polynomial order p, see fem/README.md
+
+  double length() const;
+
+  /// @throws InputError naming the first fault (dimension, material, attachment outside the boom, order out of 1..12).
+  void validate() const;
+};
+
+/// Mesh of a boom of beams with node sets "root" and "tip" and one node at every segment end and attachment.
+/// @throws InputError as BeamGeometry::validate.
+Mesh make_mesh(const BeamGeometry&);
+
+}  // namespace flexboom

@@ -1,0 +1,39 @@
+#pragma once
+
+#include "fem/booms/boom_profile.hpp"
+#include "fem/booms/solid_boom.hpp"
+#include "fem/mesh/section_grid.hpp"
+
+#include <array>
+#include <vector>
+
+// Where the planes and ring lines of a solid boom mesh are.
+namespace flexboom {
+
+/// Segments that follow one another without a step.
+struct BoomRun {
+  int first = 0;  // segments
+  int last = 0;
+  int rings = 1;
+  double from = 0;  // [m]
+  double to = 0;
+  std::vector<double> start_lines;  // SectionGrid::lines at both ends; linear in between
+  std::vector<double> end_lines;
+};
+
+struct BoomPlan {
+  SolidOptions options;  // nothing left open
+  std::vector<BoomRun> runs;
+  std::vector<BoomLayer> layers;
+  std::vector<ProfileCorner> corners;   // singular
+  std::array<int, 2> sectors = {1, 1};  // along the sides that face y (0) and z (1)
+  bool core = false;
+};
+
+/// @throws InputError as make_solid_mesh.
+BoomPlan plan_of(const BeamGeometry&, const SolidOptions&);
+
+/// Section of a run at x [m].
+SectionGrid section_at(const BeamGeometry&, const BoomPlan&, int run, double x);
+
+}  // namespace flexboom

@@ -1,0 +1,184 @@
+#include "reduction/basis/mode_selection.hpp"
+
+#include "fem/base/check.hpp"
+#include "reduction/basis/interface_nodes.hpp"
+#include "reduction/body/tilde.hpp"
+
+#include <fmt/format.h>
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <utility>
+
+namespace flexboom {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+/// The largest shares first until their sum reaches what is wanted; false: it does not.
+bool take_largest(const VectorXd& share, double wanted, std::set<int>& taken) {
+  std::vector<int> order(static_cast<size_t>(share.size()));
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, std::greater<>(), [&share](int k) { return share(k); });
+  double sum = 0;
+  for (const int k : order) {
+    if (sum >= wanted) return true;
+    sum += share(k);
+    taken.insert(k);
+  }
+  return sum >= wanted;
+}
+
+void require_fraction(double fraction) {
+  require(fraction > 0 && fraction <= 1, fmt::format("modes: the fraction must be in (0, 1], is {}", fraction));
+}
+
+}  // namespace
+
+MatrixXd rigid_coupling(const ReducedBody& body) {
+  MatrixXd L(6, body.n());
+  L << body.Ct, body.Cr0;
+  return L;
+}
+
+Matrix6d rigid_mass(const ReducedBody& body) {
+  Matrix6d M_r;
+  M_r << body.m * Eigen::Matrix3d::Identity(), -tilde(body.mc0), tilde(body.mc0), body.J0;
+  return M_r;
+}
+
+std::vector<int> modes_in_band(const ReducedBody& body, double low_hz, double high_hz) {
+  require(low_hz <= high_hz, fmt::format("modes: the band from {} Hz to {} Hz is empty", low_hz, high_hz));
+  std::vector<int> chosen;
+  for (int k = 0; k < body.n(); ++k) {
+    const double hz = body.coordinates[static_cast<size_t>(k)].frequency_hz;
+    if (hz >= low_hz && hz <= high_hz) chosen.push_back(k);
+  }
+  return chosen;
+}
+
+std::vector<int> listed_modes(const ReducedBody& body, std::vector<int> list) {
+  std::ranges::sort(list);
+  for (size_t i = 0; i < list.size(); ++i) {
+    require(list[i] >= 0 && list[i] < body.n(),
+            fmt::format("modes: {} is not a coordinate; there are 0 to {}", list[i], body.n() - 1));
+    require(i == 0 || list[i] != list[i - 1], fmt::format("modes: {} is given twice", list[i]));
+  }
+  return list;
+}
+
+ReducedBody selected(const ReducedBody& body, const std::vector<int>& list) {
+  for (const int k : list)
+    require(k >= 0 && k < body.n(), fmt::format("modes: coordinate {} chosen of a body of {}", k, body.n()));
+  require(body.gram.size() > 0, "modes: body \"" + body.name + "\" has no gram to choose coordinates from");
+  ReducedBody result = body;
+  std::vector<int> z = {0, 1, 2, 3};
+  result.coordinates.clear();
+  for (const int k : list) {
+    for (int i = 0; i < 3; ++i) z.push_back(4 + 3 * k + i);
+    result.coordinates.push_back(body.coordinates[static_cast<size_t>(k)]);
+  }
+  const auto keep = [&list](std::vector<MatrixXd>& matrices) {
+    for (MatrixXd& A : matrices) A = A(list, list).eval();
+  };
+  const auto keep_columns = [&list](Eigen::Matrix3Xd& S) { S = S(Eigen::all, list).eval(); };
+  ReducedBody blank = blank_body(body.name, static_cast<int>(list.size()));
+  set_invariants(blank, body.gram(z, z));
+  result.Ct = blank.Ct, result.Cr0 = blank.Cr0, result.Me = blank.Me, result.gram = blank.gram;
+  result.Cr1 = std::move(blank.Cr1), result.J1 = std::move(blank.J1), result.J2 = std::move(blank.J2);
+  result.Ke = body.Ke(list, list);
+  result.De = body.De(list, list);
+  for (auto* loads : {&result.Kg.spin, &result.Kg.acceleration, &result.Kg.angular_acceleration}) keep(*loads);
+  for (MarkerStiffness& at : result.Kg.markers) keep(at.force), keep(at.torque);
+  for (Marker& at : result.markers) keep_columns(at.S), keep_columns(at.S_theta);
+  std::ranges::for_each(result.display.S, keep_columns);
+  std::ranges::for_each(result.display.S_theta, keep_columns);
+  for (Interface& at : result.interfaces) renumber(at, list);
+  result.certificate.clear();
+  return result;
+}
+
+MatrixXd effective_masses(const ReducedBody& body) {
+  return rigid_coupling(body).cwiseAbs2() * body.Me.diagonal().cwiseInverse().asDiagonal();
+}
+
+std::vector<int> modes_by_effective_mass(const ReducedBody& body, double fraction, const std::vector<int>& directions) {
+  require_fraction(fraction);
+  const MatrixXd effective = effective_masses(body);
+  const Matrix6d M_r = rigid_mass(body);
+  std::set<int> taken;
+  for (const int d : directions) {
+    require(d >= 0 && d < 6, fmt::format("modes: direction {} does not exist; there are 0 to 5", d));
+    const VectorXd share = effective.row(d).transpose() / M_r(d, d);
+    require(take_largest(share, fraction, taken),
+            fmt::format("modes: all {} together have {:.6g} of the mass along {}, {} "
+                        "wanted; make more modes",
+                        body.n(), share.sum(), motion_name(d), fraction));
+  }
+  return {taken.begin(), taken.end()};
+}
+
+VectorXd completeness_indices(const ReducedBody& body) {
+  // Rotations scaled to the body, and the directions that have inertia.
+  Matrix6d M_r = rigid_mass(body);
+  Eigen::Vector<double, 6> scale;
+  scale << Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(std::sqrt(body.m / body.J0.trace()));
+  M_r = scale.asDiagonal() * M_r * scale.asDiagonal();
+  const MatrixXd L = scale.asDiagonal() * rigid_coupling(body);
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(M_r);
+  VectorXd index = VectorXd::Zero(body.n());
+  int motions = 0;
+  for (int i = 0; i < 6; ++i) {
+    if (solver.eigenvalues()(i) < 1e-12 * body.m) continue;
+    ++motions;
+    index += (L.transpose() * solver.eigenvectors().col(i)).cwiseAbs2() / solver.eigenvalues()(i);
+  }
+  return index.cwiseQuotient(body.Me.diagonal()) / motions;
+}
+
+std::vector<int> modes_by_completeness(const ReducedBody& body, double fraction) {
+  require_fraction(fraction);
+  const VectorXd index = completeness_indices(body);
+  std::set<int> taken;
+  require(take_largest(index, fraction, taken),
+          fmt::format("modes: all {} together are complete to {:.6g}, {} wanted; make more modes", body.n(),
+                      index.sum(), fraction));
+  return {taken.begin(), taken.end()};
+}
+
+MatrixXd observabilities(const ReducedBody& body, const std::vector<ObservedOutput>& outputs) {
+  MatrixXd share(std::ssize(outputs), body.n());
+  for (size_t i = 0; i < outputs.size(); ++i) {
+    const Marker& seen = marker(body, outputs[i].marker);
+    const int component = component_of(outputs[i].direction);
+    const VectorXd S = component < 3 ? seen.S.row(component) : seen.S_theta.row(component - 3);
+    auto row = share.row(static_cast<Index>(i));
+    for (int k = 0; k < body.n(); ++k) {
+      const double omega = std::sqrt(std::max(0.0, body.Ke(k, k) / body.Me(k, k)));
+      row(k) = S(k) * S(k) / (body.Me(k, k) * omega * omega * omega);
+      if (S(k) == 0) row(k) = 0;
+    }
+    const double largest = row.maxCoeff();
+    for (int k = 0; k < body.n(); ++k) row(k) = std::isinf(largest) ? double(std::isinf(row(k))) : row(k) / largest;
+    if (!(largest > 0)) row.setZero();
+  }
+  return share;
+}
+
+std::vector<int> modes_by_observability(const ReducedBody& body, const std::vector<ObservedOutput>& outputs,
+                                        double threshold) {
+  const MatrixXd share = observabilities(body, outputs);
+  std::vector<int> chosen;
+  for (int k = 0; k < body.n(); ++k) {
+    if (share.rows() > 0 && share.col(k).maxCoeff() >= threshold) chosen.push_back(k);
+  }
+  return chosen;
+}
+
+}  // namespace flexboom
