@@ -40,6 +40,7 @@ inline double lane(const Quad& a, int i) { return a.v[i]; }
 inline void set_lane(Quad& a, int i, double value) { a.v[i] = value; }
 /// The sum of the first `count` lanes.
 inline double sum(const Quad& a, int count) {
+  if (count == Quad::width) return (a.v[0] + a.v[1]) + (a.v[2] + a.v[3]);
   double s = 0;
   for (int i = 0; i < count; ++i) s += a.v[i];
   return s;

@@ -71,10 +71,14 @@ void pack_integrals(const ReducedBody& b, equations::Body& r) {
   r.J0 = spatial::sym3(b.J0);
   r.Ct = pack_columns(b.Ct);
   r.Cr0 = pack_columns(b.Cr0);
-  r.J1 = non_zeros(r.n, 1, 6, [&](size_t k, int, int c) { return symmetric_entry(b.J1[k], c); });
-  r.J2 = non_zeros(r.n, r.n, 6,
-                   [&](size_t k, int l, int c) { return symmetric_entry(b.J2[k][static_cast<size_t>(l)], c); });
-  r.Cr1 = non_zeros(r.n, r.n, 3, [&](size_t k, int l, int c) { return b.Cr1[k](c, l); });
+  r.J1 = equations::Rows<double>(
+      non_zeros(1, r.n, 6, [&](size_t, int l, int c) { return symmetric_entry(b.J1[static_cast<size_t>(l)], c); }));
+  r.J2 = equations::Rows<double>(non_zeros(
+      r.n, r.n, 6, [&](size_t k, int l, int c) { return symmetric_entry(b.J2[k][static_cast<size_t>(l)], c); }));
+  r.Cr1 = equations::Rows<double>(non_zeros(r.n, r.n, 3, [&](size_t k, int l, int c) { return b.Cr1[k](c, l); }));
+  r.Cr1_by_l = equations::Rows<double>(non_zeros(r.n, r.n, 3, [&](size_t l, int k, int c) {
+    return b.Cr1[static_cast<size_t>(k)](c, static_cast<Eigen::Index>(l));
+  }));
 }
 
 void pack_structure(const ReducedBody& b, equations::Body& r) {

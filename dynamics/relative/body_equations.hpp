@@ -7,7 +7,9 @@
 #include "dynamics/numerics/dual.hpp"
 #include "dynamics/numerics/spatial.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace flexboom::equations {
@@ -21,6 +23,44 @@ struct TermOf {
 };
 using Term = TermOf<double>;
 
+/// A row of sums: entries `begin` to `end` of a `Rows`, whose sum is of `k` and `component`.
+struct RowOf {
+  int k = 0, component = 0, begin = 0, end = 0;
+};
+
+/// Terms in rows, one for each k and component that has any: the sum over l of value * x[l] stays in registers.
+template <class C>
+struct Rows {
+  std::vector<RowOf> rows;
+  std::vector<int> l;
+  std::vector<C> value;
+
+  Rows() = default;
+  explicit Rows(std::vector<TermOf<C>> terms) {
+    std::ranges::stable_sort(terms, {}, [](const TermOf<C>& t) { return std::pair(t.k, t.component); });
+    for (const TermOf<C>& t : terms) {
+      const auto at = static_cast<int>(l.size());
+      if (rows.empty() || rows.back().k != t.k || rows.back().component != t.component)
+        rows.push_back({t.k, t.component, at, at});
+      ++rows.back().end;
+      l.push_back(t.l), value.push_back(t.value);
+    }
+  }
+
+  template <class T>
+  T sum(const RowOf& row, const T* x) const {
+    T even(0.0), odd(0.0);  // two chains of additions at a time
+    int i = row.begin;
+    for (; i + 1 < row.end; i += 2) {
+      const auto a = static_cast<size_t>(i);
+      even += value[a] * x[l[a]];
+      odd += value[a + 1] * x[l[a + 1]];
+    }
+    if (i < row.end) even += value[static_cast<size_t>(i)] * x[l[static_cast<size_t>(i)]];
+    return even + odd;
+  }
+};
+
 /// Constants of one appendage, packed for the inner loop. Arrays over modes are contiguous.
 template <class C>
 struct BodyOf {
@@ -28,13 +68,14 @@ struct BodyOf {
   C m = 0;
   Vec3<C> mc0;
   Sym3<C> J0;
-  std::vector<Vec3<C>> Ct, Cr0;        // n
-  std::vector<TermOf<C>> Cr1, J1, J2;  // non-zeros
-  std::vector<C> Ke, De, Me;           // n x n
-  std::vector<C> Me_inverse;           // n x n
-  bool diagonal = false;               // Ke, De and Me are diagonal: modes, no constraint shapes
-  std::vector<Vec3<C>> Gt;             // Me^-1 Ct^T, n
-  Sym3<C> Ctt;                         // Ct Me^-1 Ct^T
+  std::vector<Vec3<C>> Ct, Cr0;  // n
+  Rows<C> J1, J2;                // J1: a row per component, over k in the place of l
+  Rows<C> Cr1, Cr1_by_l;         // sums over l; over k, for each l in the place of k
+  std::vector<C> Ke, De, Me;     // n x n
+  std::vector<C> Me_inverse;     // n x n
+  bool diagonal = false;         // Ke, De and Me are diagonal: modes, no constraint shapes
+  std::vector<Vec3<C>> Gt;       // Me^-1 Ct^T, n
+  Sym3<C> Ctt;                   // Ct Me^-1 Ct^T
 
   size_t row_begin(size_t k) const { return diagonal ? k : 0; }
   size_t row_end(size_t k) const { return diagonal ? k + 1 : static_cast<size_t>(n); }
@@ -51,8 +92,9 @@ struct BodyScratch {
   std::vector<Vec3<T>> Cr;  // Cr(q), n
   std::vector<Vec3<T>> Gw;  // Me^-1 Cr^T, n
   std::vector<T> b, g;      // modal force and Me^-1 of it, n
+  std::vector<T> J2_q;      // the rows of J2 times q
 
-  explicit BodyScratch(size_t n = 0) : Cr(n), Gw(n), b(n), g(n) {}
+  explicit BodyScratch(size_t n = 0, size_t rows = 0) : Cr(n), Gw(n), b(n), g(n), J2_q(rows) {}
 };
 
 /// Mass matrix (symmetric, in blocks of translation and rotation) and force of the hub with everything condensed to it,
@@ -117,7 +159,7 @@ T hinge_torque(const BodyOf<C>& body, const T& gap, const T& rate, const C& clos
   return body.preload - k * gap - body.damping * rate;
 }
 
-/// Inertia of the deformed body: mc(q), J(q), Jdot; Cr(q) goes to the scratch.
+/// Inertia of the deformed body: mc(q), J(q), Jdot; Cr(q) and J2 q go to the scratch.
 template <class T>
 struct Inertia {
   Vec3<T> mc;
@@ -133,15 +175,17 @@ Inertia<T> inertia_at(const BodyOf<C>& body, const T* q, const T* q_dot, BodyScr
     r.mc += q[k] * body.Ct[k];
     s.Cr[k] = lift<T>(body.Cr0[k]);
   }
-  for (const TermOf<C>& t : body.Cr1) component(s.Cr[static_cast<size_t>(t.l)], t.component) += t.value * q[t.k];
-  for (const TermOf<C>& t : body.J1) {
-    component(r.J, t.component) += t.value * q[t.k];
-    component(r.J_dot, t.component) += t.value * q_dot[t.k];
+  for (const RowOf& row : body.Cr1_by_l.rows)
+    component(s.Cr[static_cast<size_t>(row.k)], row.component) += body.Cr1_by_l.sum(row, q);
+  for (const RowOf& row : body.J1.rows) {
+    component(r.J, row.component) += body.J1.sum(row, q);
+    component(r.J_dot, row.component) += body.J1.sum(row, q_dot);
   }
-  for (const TermOf<C>& t : body.J2) {  // symmetric in k, l: d/dt(q_k q_l) summed over both is 2 q_dot_k q_l
-    const T vq = t.value * q[t.l];
-    component(r.J, t.component) += vq * q[t.k];
-    component(r.J_dot, t.component) += 2.0 * (vq * q_dot[t.k]);
+  for (size_t i = 0; i < body.J2.rows.size(); ++i) {  // symmetric in k, l: d/dt(q_k q_l) over both is 2 q_dot_k q_l
+    const RowOf& row = body.J2.rows[i];
+    const T v = s.J2_q[i] = body.J2.sum(row, q);
+    component(r.J, row.component) += v * q[row.k];
+    component(r.J_dot, row.component) += 2.0 * (v * q_dot[row.k]);
   }
   return r;
 }
@@ -158,22 +202,33 @@ void elastic_forces(const BodyOf<C>& body, const T* q, const T* q_dot, T* b) {
   }
 }
 
-/// Adds the modal forces of the motion, 1/2 w^T dJ/dq_k w + 2 w . (Cr1[k] q_dot) (README, "Equations of motion"), of
-/// one body with angular velocity w in its own axes.
+/// Adds scale * 1/2 g : dJ/dq_k to b, g a symmetric matrix by xx, yy, zz, 2 xy, 2 yz, 2 zx. After `inertia_at`.
 template <class C, class T>
-void add_inertial_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q, const T* q_dot, T* b) {
-  const T ww[] = {w.x * w.x, w.y * w.y, w.z * w.z, 2.0 * (w.x * w.y), 2.0 * (w.y * w.z), 2.0 * (w.z * w.x)};
-  for (const TermOf<C>& t : body.J1) b[t.k] += (0.5 * t.value) * ww[t.component];
-  for (const TermOf<C>& t : body.J2) b[t.k] += t.value * (q[t.l] * ww[t.component]);
+void add_inertia_slope(const BodyOf<C>& body, double scale, const T (&g)[6], const BodyScratch<T>& s, T* b) {
+  for (const RowOf& row : body.J1.rows) {
+    const T half = (0.5 * scale) * g[row.component];
+    for (int i = row.begin; i < row.end; ++i)
+      b[body.J1.l[static_cast<size_t>(i)]] += body.J1.value[static_cast<size_t>(i)] * half;
+  }
+  for (size_t i = 0; i < body.J2.rows.size(); ++i)
+    b[body.J2.rows[i].k] += s.J2_q[i] * (scale * g[body.J2.rows[i].component]);
+}
+
+/// Adds the modal forces of the motion, 1/2 w^T dJ/dq_k w + 2 w . (Cr1[k] q_dot) (README, "Equations of motion"), of
+/// one body with angular velocity w in its own axes. After `inertia_at`.
+template <class C, class T>
+void add_inertial_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q_dot, const BodyScratch<T>& s, T* b) {
+  add_inertia_slope(body, 1.0,
+                    {w.x * w.x, w.y * w.y, w.z * w.z, 2.0 * (w.x * w.y), 2.0 * (w.y * w.z), 2.0 * (w.z * w.x)}, s, b);
   const T* const wi[] = {&w.x, &w.y, &w.z};
-  for (const TermOf<C>& t : body.Cr1) b[t.k] += (2.0 * t.value) * (*wi[t.component] * q_dot[t.l]);
+  for (const RowOf& row : body.Cr1.rows) b[row.k] += (2.0 * *wi[row.component]) * body.Cr1.sum(row, q_dot);
 }
 
 /// Both, to the scratch.
 template <class C, class T>
 void modal_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q, const T* q_dot, BodyScratch<T>& s) {
   elastic_forces(body, q, q_dot, s.b.data());
-  add_inertial_forces(body, w, q, q_dot, s.b.data());
+  add_inertial_forces(body, w, q_dot, s, s.b.data());
 }
 
 /// Solves the 6 x 6 system of the hub by two 3 x 3 Cholesky factorisations in blocks (LDL^T of the whole, unrolled by a

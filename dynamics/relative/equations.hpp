@@ -381,7 +381,7 @@ inline void release_leaves(const Leaves& leaves, const Model& model, const std::
 template <class T>
 void accelerate(const Model& model, const T* y, const Instant& instant, std::span<const char> contact,
                 Scratch<T>& scratch, T* y_dot) {
-  for (LinkScratch<T>& s : scratch.links) s.I = {};
+  for (const size_t i : scratch.singles) scratch.links[i].I = {};
   if constexpr (has_leaves<T>)
     for (size_t i = 0; i < scratch.leaves.size(); ++i)
       condense_leaves(model.leaves[i], model, contact, scratch.links, scratch.leaves[i]);

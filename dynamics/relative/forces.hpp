@@ -106,11 +106,8 @@ void pull_by_field(const equations::BodyOf<C>& body, const OrbitalField& field, 
     s.external_modal[k] += modal;
     power += modal * q_dot[k];
   }
-  const T g[] = {G.xx, G.yy, G.zz, 2.0 * G.xy, 2.0 * G.yz, 2.0 * G.zx};
-  for (const equations::TermOf<C>& term : body.J1)
-    s.external_modal[static_cast<size_t>(term.k)] -= 0.5 * term.value * g[term.component];
-  for (const equations::TermOf<C>& term : body.J2)
-    s.external_modal[static_cast<size_t>(term.k)] -= term.value * q[term.l] * g[term.component];
+  equations::add_inertia_slope(body, -1.0, {G.xx, G.yy, G.zz, 2.0 * G.xy, 2.0 * G.yz, 2.0 * G.zx}, s.modes,
+                               s.external_modal.data());
 }
 
 /// On all bodies.

@@ -128,7 +128,7 @@ equations::Inertia<T> second_order_body(const Link& link, const Vec3<T>& w, cons
   const equations::Inertia<T> inertia = equations::inertia_at(link.shapes, s.Q.data(), s.Q_dot.data(), s.shapes);
   equations::elastic_forces(link.body, q, q_dot, modes.b.data());
   for (T& f : s.shapes.b) f = T(0.0);
-  equations::add_inertial_forces(link.shapes, w, s.Q.data(), s.Q_dot.data(), s.shapes.b.data());
+  equations::add_inertial_forces(link.shapes, w, s.Q_dot.data(), s.shapes, s.shapes.b.data());
   for (size_t k = 0; k < n; ++k) {
     s.Ct[k] = equations::lift<T>(link.shapes.Ct[k]);
     modes.Cr[k] = s.shapes.Cr[k];

@@ -99,8 +99,8 @@ struct LeavesScratch {
   std::vector<Quad> q, q_dot;  // n
   LinkScratch<Quad> link;
 
-  explicit LeavesScratch(int size) : q(static_cast<size_t>(size)), q_dot(q.size()) {
-    link.modes = equations::BodyScratch<Quad>(q.size());
+  explicit LeavesScratch(const equations::BodyOf<Quad>& body) : q(static_cast<size_t>(body.n)), q_dot(q.size()) {
+    link.modes = equations::BodyScratch<Quad>(q.size(), body.J2.rows.size());
     link.external_modal.resize(q.size()), link.q_ddot.resize(q.size());
   }
 };
@@ -121,7 +121,7 @@ struct Scratch {
   explicit Scratch(const Model& model, bool side_by_side = has_leaves<T>) : links(model.links.size()) {
     if (side_by_side) {
       singles = model.singles;
-      for (const Leaves& l : model.leaves) leaves.emplace_back(l.body.n);
+      for (const Leaves& l : model.leaves) leaves.emplace_back(l.body);
     } else {
       singles.resize(links.size());
       std::iota(singles.begin(), singles.end(), size_t{0});
@@ -132,14 +132,14 @@ struct Scratch {
       LinkScratch<T>& s = links[i];
       const auto n = static_cast<size_t>(link.body.n), k = static_cast<size_t>(link.slots);
       most = std::max(most, n);
-      s.modes.Cr.resize(n), s.modes.Gw.resize(n), s.modes.b.resize(n), s.modes.g.resize(n);
+      s.modes = equations::BodyScratch<T>(n, link.body.J2.rows.size());
       s.external_modal.resize(n), s.q_ddot.resize(n);
       if (!link.hung_on_moving_place) fix_place(link.a, s.a);
       if (link.second_order) {
         SecondOrderScratch<T>& o = s.second_order;
         const size_t r = link.followers();
         o.Q.resize(n + r), o.Q_dot.resize(n + r), o.Q_ddot.resize(r), o.slope.resize(r * n);
-        o.shapes = equations::BodyScratch<T>(n + r);
+        o.shapes = equations::BodyScratch<T>(n + r, link.shapes.J2.rows.size());
         o.Ct.resize(n), o.Gt.resize(n), o.Me.resize(n * n), o.factor.resize(n * n), o.Me_inverse.resize(n * n);
       }
       s.hung.resize(k), s.place.resize(k);

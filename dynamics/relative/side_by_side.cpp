@@ -4,6 +4,7 @@
 #include <array>
 #include <map>
 #include <tuple>
+#include <utility>
 
 namespace flexboom::tree {
 namespace {
@@ -48,14 +49,19 @@ std::vector<Quad> numbers(const Members& bodies, std::vector<double> Body::*memb
   return r;
 }
 
-/// Terms that any of the bodies has.
-std::vector<TermOf<Quad>> terms(const Members& bodies, std::vector<Term> Body::*member) {
+/// Rows of the terms that any of the bodies has.
+equations::Rows<Quad> rows(const Members& bodies, equations::Rows<double> Body::*member) {
   std::map<std::tuple<int, int, int>, Quad> values;
-  for (int i = 0; i < Quad::width; ++i)
-    for (const Term& t : bodies[static_cast<size_t>(i)]->*member) set_lane(values[{t.k, t.l, t.component}], i, t.value);
-  std::vector<TermOf<Quad>> r;
-  for (const auto& [key, value] : values) r.push_back({std::get<0>(key), std::get<1>(key), std::get<2>(key), value});
-  return r;
+  for (int lane = 0; lane < Quad::width; ++lane) {
+    const equations::Rows<double>& of_body = bodies[static_cast<size_t>(lane)]->*member;
+    for (const equations::RowOf& row : of_body.rows)
+      for (auto i = static_cast<size_t>(row.begin); i < static_cast<size_t>(row.end); ++i)
+        set_lane(values[{row.k, of_body.l[i], row.component}], lane, of_body.value[i]);
+  }
+  std::vector<TermOf<Quad>> terms;
+  for (const auto& [key, value] : values)
+    terms.push_back({std::get<0>(key), std::get<1>(key), std::get<2>(key), value});
+  return equations::Rows<Quad>(std::move(terms));
 }
 
 equations::BodyOf<Quad> body_side_by_side(const Members& b) {
@@ -67,9 +73,10 @@ equations::BodyOf<Quad> body_side_by_side(const Members& b) {
   r.J0 = symmetric(b, [](const Body& x) { return x.J0; });
   r.Ct = vectors(b, &Body::Ct);
   r.Cr0 = vectors(b, &Body::Cr0);
-  r.Cr1 = terms(b, &Body::Cr1);
-  r.J1 = terms(b, &Body::J1);
-  r.J2 = terms(b, &Body::J2);
+  r.Cr1 = rows(b, &Body::Cr1);
+  r.Cr1_by_l = rows(b, &Body::Cr1_by_l);
+  r.J1 = rows(b, &Body::J1);
+  r.J2 = rows(b, &Body::J2);
   r.Ke = numbers(b, &Body::Ke);
   r.De = numbers(b, &Body::De);
   r.Me = numbers(b, &Body::Me);
