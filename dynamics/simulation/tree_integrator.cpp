@@ -106,11 +106,13 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     return ode_->gap_rate(y_dot_.data(), static_cast<int>(stop));
   }
 
-  /// The exponential method has no error in what a hinge does when it hardly moves.
+  /// The exponential method has no error in what a hinge does when it hardly moves. What no symmetry would move at all
+  /// has the round-off of what turns.
   double noise(size_t stop) const override {
     const ErrorScale& error = scales_.error();
     const double of_steps = noise_of_methods * error.tolerance * error.scale[scalar(stop)];
-    return exact_in_linear_part_ ? std::min(of_steps, 1e-14 * contacts_.largest_gap(stop)) : of_steps;
+    const double of_method = exact_in_linear_part_ ? std::min(of_steps, 1e-14 * contacts_.largest_gap(stop)) : of_steps;
+    return std::max(of_method, 1e-16 * fastest_turn_ * contacts_.stop(stop).period);
   }
 
   void put_on_stop(size_t stop) override { y_[scalar(stop)] = 0; }
@@ -191,7 +193,11 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     std::copy(crossed_.begin() + stops, crossed_.end(), laws_.crossed().begin());
   }
   void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override { stepper_->interpolate_all(times, Y); }
-  void observe(const VectorXd& y) override { scales_.observe(y); }
+  void observe(const VectorXd& y) override {
+    scales_.observe(y);
+    for (const TreeLayout::Joint& j : tree_.layout().joints)
+      if (j.omega >= 0) fastest_turn_ = std::max(fastest_turn_, y.segment<3>(j.omega).norm());
+  }
   void keep_rows(size_t rows) override {
     result_.y.resize(rows), result_.balance.resize(rows);
     if (!laws_.empty()) result_.laws.resize(rows);
@@ -246,6 +252,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   std::unique_ptr<Ode> ode_;
   std::unique_ptr<Stepper> stepper_;
   bool exact_in_linear_part_;
+  double fastest_turn_ = 0;  // of a floating body [rad/s]
   Pilot* pilot_;
   TreeWorkspaceHandle work_;
   bool has_stiffening_;                    // has any body a Kg?
