@@ -170,6 +170,8 @@ void print_summary(const RunResult& r, const std::filesystem::path& folder) {
     fmt::print("errors of the outputs: discretisation {}, truncation {}, time {}, linearisation {}; total {}\n",
                measured(r.budget.discretisation), measured(r.budget.truncation), measured(r.budget.time),
                measured(r.budget.linearisation), measured(r.budget.total()));
+  if (r.budget.measured && r.budget.worst() != nullptr)
+    fmt::print("worst output: {}\n", description(*r.budget.worst()));
   fmt::print("results: {}\n", folder.string());
 }
 

@@ -154,6 +154,28 @@ std::string rows(const json& object, const std::string& prefix = "") {
   return r;
 }
 
+/// Errors of each output, the worst first.
+std::string outputs_table(const json& outputs) {
+  std::vector<std::pair<std::string, json>> all;
+  for (const auto& [name, errors] : outputs.items()) all.emplace_back(name, errors);
+  std::ranges::stable_sort(all, [](const auto& a, const auto& b) {
+    const auto size = [](const json& e) { return e.at("total").is_null() ? 1e300 : e.at("total").get<double>(); };
+    return size(a.second) > size(b.second);
+  });
+  std::string r = "<table><tr><th>output</th>";
+  const std::array<const char*, 7> keys = {"total",         "discretisation", "truncation", "time",
+                                           "linearisation", "scale",          "worst_at"};
+  for (const char* key : keys)
+    r += fmt::format("<th>{}</th>", std::string_view(key) == "worst_at" ? "worst at [s]" : key);
+  r += "</tr>\n";
+  for (const auto& [name, errors] : all) {
+    r += fmt::format("<tr><th>{}</th>", escaped(name));
+    for (const char* key : keys) r += fmt::format("<td>{}</td>", cell(errors.at(key)));
+    r += "</tr>\n";
+  }
+  return r + "</table>\n";
+}
+
 std::string bodies_table(const json& bodies) {
   std::string r =
       "<table><tr><th>body</th><th>structure</th><th>unknowns</th><th>modes</th><th>frequencies, clamped "
@@ -195,6 +217,7 @@ std::string page(const Folder& f) {
   h += "<h2>How wrong is it?</h2>\n<table>" + rows(s.at("error_budget")) +
        fmt::format("<tr><th>energy balance</th><td>{}</td></tr><tr><th>momentum drift</th><td>{}</td></tr></table>\n",
                    cell(s.at("energy_balance")), cell(s.at("momentum_drift")));
+  if (const json& outputs = s.at("error_budget").at("outputs"); !outputs.empty()) h += outputs_table(outputs);
   h += "<h2>What was simulated</h2>\n" + bodies_table(s.at("bodies")) + "<ul>\n";
   for (const json& line : s.at("plan")) h += "<li>" + escaped(line.get<std::string>()) + "</li>\n";
   for (const json& line : s.at("warnings")) h += "<li><b>warning:</b> " + escaped(line.get<std::string>()) + "</li>\n";

@@ -51,18 +51,29 @@ std::string event_rows(const RunResult& r, size_t first) {
 
 namespace {
 
+/// Parts and total of errors: of an output, or of all.
+template <class Errors>
+ordered_json parts_json(const Errors& e, bool measured = true) {
+  const auto part = [measured](double error) { return measured ? ordered_json(error) : ordered_json(nullptr); };
+  return {{"discretisation", part(e.discretisation)},
+          {"truncation", part(e.truncation)},
+          {"time", part(e.time)},
+          {"linearisation", part(e.linearisation)},
+          {"total", part(e.total())}};
+}
+
 ordered_json budget_json(const ErrorBudget& b) {
-  if (!b.measured)
-    return {{"discretisation", nullptr},
-            {"truncation", nullptr},
-            {"time", nullptr},
-            {"linearisation", nullptr},
-            {"total", nullptr}};
-  return {{"discretisation", b.discretisation},
-          {"truncation", b.truncation},
-          {"time", b.time},
-          {"linearisation", b.linearisation},
-          {"total", b.total()}};
+  ordered_json j = parts_json(b, b.measured);
+  ordered_json outputs = ordered_json::object();
+  for (const OutputErrors& o : b.outputs) {
+    outputs[o.name] = parts_json(o);
+    if (o.is_of_its_basis()) outputs[o.name]["discretisation"] = outputs[o.name]["truncation"] = nullptr;
+    outputs[o.name]["scale"] = o.scale;
+    outputs[o.name]["worst_at"] = o.when;
+  }
+  j["worst"] = b.measured && b.worst() != nullptr ? ordered_json(b.worst()->name) : ordered_json(nullptr);
+  j["outputs"] = b.measured ? outputs : ordered_json(nullptr);
+  return j;
 }
 
 /// null: of a hub without joints.

@@ -87,11 +87,12 @@ struct OrbitScene {
 /// Everything `flexboom run` needs. Defaults are the values a file may leave out.
 struct Scene {
   std::string name;
-  double duration = 10;              // [s]
-  double output_step = 0.01;         // [s]
-  double vtu_step = 0;               // [s]; 0: no VTU files
-  double tolerance = 1e-6;           // [accuracy] tolerance
-  std::vector<std::string> outputs;  // [accuracy] outputs; empty: all
+  double duration = 10;               // [s]
+  double output_step = 0.01;          // [s]
+  double vtu_step = 0;                // [s]; 0: no VTU files
+  double tolerance = 1e-6;            // [accuracy] tolerance
+  std::vector<std::string> outputs;   // [accuracy] outputs; empty: all
+  std::vector<std::string> absolute;  // [accuracy] absolute: errors that do not count, "1e-9 rad"
   bool error_budget = true;  // [accuracy] budget: repeat the run with a finer everything and print the differences
   std::string integrator = "auto";       // [integrator] method; "auto": what suits the scene
   std::string formulation = "relative";  // [integrator] formulation

@@ -1,5 +1,6 @@
 // The keys of a scene: name, unit, meaning, value, range. Their defaults are those of the structs.
 
+#include "apps/scene/absolute_error.hpp"
 #include "apps/scene/keys.hpp"
 #include "apps/scene/scene_checks.hpp"
 #include "apps/scene/scene_keys.hpp"
@@ -64,9 +65,21 @@ void starts(Faults& faults, const std::string& path, const std::vector<double>& 
   for (const double value : values) start(faults, path, value, "");
 }
 
+void absolute_errors(Faults& faults, const std::string& path, const std::vector<std::string>& texts, std::string_view) {
+  for (const std::string& text : texts) {
+    try {
+      absolute_error(text);
+    } catch (const InputError& e) {
+      faults.add(path, e.what());
+    }
+  }
+}
+
 void accuracy_keys(Archive& a, Scene& s) {
   a.key({"tolerance", "", "relative error wanted in the outputs, 1e-14 to 0.1"}, s.tolerance, tolerance);
   a.key({"outputs", "", "columns whose errors count, a vector being one: `\"hub.rotation\"`", false, "all"}, s.outputs);
+  a.key({"absolute", "", "errors that do not count, with their unit: `[\"1e-9 rad\", \"1e-6 m\"]`", false, "none"},
+        s.absolute, absolute_errors);
   a.key({"budget", "", "whether the run is repeated to measure its errors"}, s.error_budget);
 }
 

@@ -45,17 +45,30 @@ OutputTable without_coordinates(const OutputTable& table) {
   return r;
 }
 
+using Part = double OutputErrors::*;
+
 /// What fills a budget.
 struct Measuring {
   const RunHooks& hooks;
   std::vector<std::string>& plan;
-  ErrorBudget budget;
+  OutputFloors floors;
+  ErrorBudget budget{};
 
   bool stopped() const { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
 
-  double missing(std::string_view part, std::string_view why) {
+  void missing(std::string_view part, std::string_view why) {
     budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
-    return unknown;
+  }
+
+  /// Enters what a repeat has changed in each output, and `more` in all.
+  double enter(Part part, const std::vector<OutputDifference>& differences, double more = 0) {
+    for (OutputErrors& o : budget.outputs) {
+      const auto d = std::ranges::find(differences, o.name, &OutputDifference::name);
+      const double error = d == differences.end() ? 0 : d->error, before = worst_part(o);
+      o.*part = error + more;
+      if (error > before) o.when = d->time;
+    }
+    return largest(differences) + more;
   }
 
   /// What `repeat` says; the run that is repeated outlives its failure.
@@ -64,8 +77,17 @@ struct Measuring {
     try {
       return repeat();
     } catch (const std::runtime_error& e) {
-      return missing(part, e.what());
+      missing(part, e.what());
+      return unknown;
     }
+  }
+
+ private:
+  static double worst_part(const OutputErrors& o) {
+    double r = 0;
+    for (const double error : {o.discretisation, o.truncation, o.time, o.linearisation})
+      if (error > r) r = error;
+    return r;
   }
 };
 
@@ -77,8 +99,16 @@ double settle_time_error(const Scene& scene, Scene& flown, Run& run, Measuring& 
     Scene tight = flown;
     tight.tolerance /= 10;
     Run finer = run_once(tight, m.hooks);
-    const double error = largest(compare_outputs(run.outputs, finer.outputs, scene.outputs));
-    if (error <= scene.tolerance || i == most || m.stopped() || tight.tolerance < 1e-13) return error;
+    const std::vector<OutputDifference> differences =
+        compare_outputs(run.outputs, finer.outputs, scene.outputs, m.floors);
+    const double error = largest(differences);
+    if (error <= scene.tolerance || i == most || m.stopped() || tight.tolerance < 1e-13) {
+      for (const OutputDifference& d : differences) {
+        m.budget.outputs.push_back({});
+        m.budget.outputs.back().name = d.name, m.budget.outputs.back().scale = d.scale;
+      }
+      return m.enter(&OutputErrors::time, differences);
+    }
     run = std::move(finer);
     flown = tight;
     m.plan.push_back(fmt::format(
@@ -88,21 +118,23 @@ double settle_time_error(const Scene& scene, Scene& flown, Run& run, Measuring& 
   }
 }
 
-/// Difference of the outputs of another flight at a bearable cost.
-double change(const Run& run, const Scene& other, int refine, const RunHooks& hooks) {
+/// Differences of the outputs of another flight at a bearable cost.
+std::vector<OutputDifference> change(const Run& run, const Scene& other, int refine, const Measuring& m) {
   const long bearable = 20 * run.motion.summary.steps + 10000;
-  const OutputTable repeated = without_coordinates(run_once(other, hooks, refine, bearable).outputs);
-  return largest(compare_outputs(without_coordinates(run.outputs), repeated, other.outputs));
+  const OutputTable repeated = without_coordinates(run_once(other, m.hooks, refine, bearable).outputs);
+  return compare_outputs(without_coordinates(run.outputs), repeated, other.outputs, m.floors);
 }
 
 /// The modes left out, first with few digits: more only where the answer would drown in the error of time integration.
-double truncation_error(const Run& run, const Scene& flown, const RunHooks& hooks) {
+double truncation_error(const Run& run, const Scene& flown, Measuring& m) {
   Scene more = with_more_modes(flown);
   more.tolerance = std::max(flown.tolerance, 1e-5);
-  const double error = change(run, more, 0, hooks);
-  if (more.tolerance == flown.tolerance || !(error <= 10 * more.tolerance)) return error;
-  more.tolerance = flown.tolerance;
-  return change(run, more, 0, hooks);
+  std::vector<OutputDifference> differences = change(run, more, 0, m);
+  if (more.tolerance != flown.tolerance && largest(differences) <= 10 * more.tolerance) {
+    more.tolerance = flown.tolerance;
+    differences = change(run, more, 0, m);
+  }
+  return m.enter(&OutputErrors::truncation, differences);
 }
 
 Scene with_stiffening(Scene scene) {
@@ -120,39 +152,56 @@ double linearisation_error(const Run& run, const Scene& flown, Measuring& m) {
   for (size_t i = 0; i < run.bodies.size(); ++i) {
     const ReducedBody& body = run.bodies[i].body;
     if (body.n() == 0) continue;
-    if (body.Kg.spin.empty() && (body.structure == "eq14" || !bodies[i].is_boom()))
-      return m.missing("linearisation", fmt::format("body {} has no geometric stiffness", body.name));
+    if (body.Kg.spin.empty() && (body.structure == "eq14" || !bodies[i].is_boom())) {
+      m.missing("linearisation", fmt::format("body {} has no geometric stiffness", body.name));
+      return unknown;
+    }
     left_out = left_out || run.tree->stiffening(static_cast<int>(i)) == Stiffening::off;
     deflection = std::max(deflection, run.bending[i].of_length);
   }
-  return (left_out ? change(run, with_stiffening(flown), 0, m.hooks) : 0) + deflection * deflection;
+  const std::vector<OutputDifference> differences =
+      left_out ? change(run, with_stiffening(flown), 0, m) : std::vector<OutputDifference>();
+  return m.enter(&OutputErrors::linearisation, differences, deflection * deflection);
+}
+
+/// The largest radius of gyration of a body: what lengths of the scene are like.
+double length_of(const Run& run) {
+  double r = 0;
+  for (const PreparedBody& p : run.bodies) r = std::max(r, std::sqrt(p.body.J0.trace() / p.body.m));
+  return r;
 }
 
 }  // namespace
 
 ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
-  Measuring m{hooks, plan, {}};
+  OutputFloors floors{scene.tolerance, length_of(run)};
+  for (const std::string& text : scene.absolute) floors.absolute.push_back(absolute_error(text));
+  Measuring m{hooks, plan, floors};
   ErrorBudget& budget = m.budget;
   Scene flown = scene;
   const BodyScene* reduced = any_reduced(scene);
   const std::string finished =
       reduced ? fmt::format("body {} was reduced before, and its file has no more", reduced->name) : "";
   budget.time = m.measured("time", [&] { return settle_time_error(scene, flown, run, m); });
+  const auto none = [&m](Part part) { return m.enter(part, {}); };
   if (!m.stopped()) {
     if (reduced)
-      budget.truncation = m.missing("truncation", finished + " modes");
+      m.missing("truncation", finished + " modes");
     else if (scene.from && any_elastic(scene))
-      budget.truncation = m.missing("truncation", "a saved state knows nothing of modes beyond its own");
+      m.missing("truncation", "a saved state knows nothing of modes beyond its own");
+    else if (any_elastic(scene))
+      budget.truncation = m.measured("truncation", [&] { return truncation_error(run, flown, m); });
     else
-      budget.truncation =
-          any_elastic(scene) ? m.measured("truncation", [&] { return truncation_error(run, flown, hooks); }) : 0;
+      budget.truncation = none(&OutputErrors::truncation);
   }
   if (!m.stopped()) {
+    const auto finer = [&] { return m.enter(&OutputErrors::discretisation, change(run, flown, 2, m)); };
     if (reduced && reduced->reduced->structure != "eq14")
-      budget.discretisation = m.missing("discretisation", finished + " elements");
+      m.missing("discretisation", finished + " elements");
+    else if (any_elastic(scene, "beam") || any_elastic(scene, "solid"))
+      budget.discretisation = m.measured("discretisation", finer);
     else
-      budget.discretisation =
-          any_elastic(scene, "beam") ? m.measured("discretisation", [&] { return change(run, flown, 2, hooks); }) : 0;
+      budget.discretisation = none(&OutputErrors::discretisation);
   }
   if (!m.stopped())
     budget.linearisation = m.measured("linearisation", [&] { return linearisation_error(run, flown, m); });
@@ -177,11 +226,12 @@ void choose_modes(Scene& scene, const RunHooks& hooks, std::vector<std::string>&
     sketch.tolerance = std::max(scene.tolerance, 1e-5);
     return without_coordinates(run_once(sketch, hooks).outputs);
   };
+  const OutputFloors floors{scene.tolerance};
   OutputTable fewer = with_modes(1);
   for (int n = 1; n < most; ++n) {
     OutputTable more = with_modes(n + 1);
     if (hooks.interrupt != nullptr && hooks.interrupt->load()) return;
-    const double error = largest(compare_outputs(fewer, more, scene.outputs));
+    const double error = largest(compare_outputs(fewer, more, scene.outputs, floors));
     if (error <= scene.tolerance) {
       set_modes(n);
       plan.push_back(

@@ -23,67 +23,6 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-namespace {
-
-/// "sip.q2" -> "sip.q", "hub.rotation.x" -> "hub.rotation", "sip.angle" -> "sip.angle".
-std::string output_of_column(const std::string& column) {
-  const auto dot = column.rfind('.');
-  if (dot == std::string::npos) return column;
-  const std::string last = column.substr(dot + 1);
-  if (last == "x" || last == "y" || last == "z") return column.substr(0, dot);
-  if (last.size() > 1 && last[0] == 'q' && std::isdigit(static_cast<unsigned char>(last[1])))
-    return column.substr(0, dot) + ".q";
-  return column;
-}
-
-bool is_wanted(const std::string& output, const std::vector<std::string>& wanted) {
-  if (output == "t" || output.starts_with("energy.") || output.starts_with("lvlh.")) return false;
-  return wanted.empty() || std::find(wanted.begin(), wanted.end(), output) != wanted.end();
-}
-
-/// Angle of the rotation that leads from one rotation vector to another: their difference jumps where the angle passes
-/// pi.
-double angle_between(const Vector3d& a, const Vector3d& b) {
-  return rotation_vector(quaternion_product(quaternion_of(-a), quaternion_of(b))).norm();
-}
-
-}  // namespace
-
-std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
-                                              const std::vector<std::string>& wanted) {
-  const Eigen::Index rows = std::min(a.values.rows(), b.values.rows());
-  std::vector<std::string> order;
-  std::map<std::string, std::vector<std::pair<Eigen::Index, Eigen::Index>>> columns;
-  for (size_t i = 0; i < a.names.size(); ++i) {
-    const auto j = std::find(b.names.begin(), b.names.end(), a.names[i]);
-    const std::string output = output_of_column(a.names[i]);
-    if (j == b.names.end() || !is_wanted(output, wanted)) continue;
-    if (!columns.contains(output)) order.push_back(output);
-    columns[output].emplace_back(static_cast<Eigen::Index>(i), j - b.names.begin());
-  }
-  std::vector<OutputDifference> result;
-  for (const std::string& output : order) {
-    double difference = 0, size = 0;
-    for (Eigen::Index row = 0; row < rows; ++row) {
-      VectorXd u(columns[output].size()), v(columns[output].size());
-      for (size_t k = 0; k < columns[output].size(); ++k) {
-        u[static_cast<Eigen::Index>(k)] = a.values(row, columns[output][k].first);
-        v[static_cast<Eigen::Index>(k)] = b.values(row, columns[output][k].second);
-      }
-      difference = std::max(difference, output.ends_with(".rotation") ? angle_between(u, v) : (u - v).norm());
-      size = std::max(size, v.norm());
-    }
-    result.push_back({output, size > 0 ? difference / size : difference});
-  }
-  return result;
-}
-
-double largest(const std::vector<OutputDifference>& differences) {
-  double r = 0;
-  for (const OutputDifference& d : differences) r = std::max(r, d.error);
-  return r;
-}
-
 IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, std::string_view chosen,
                                      long max_steps) {
   IntegratorOptions o;
@@ -237,8 +176,11 @@ void add_warnings(const Run& run, RunResult& r) {
   for (const std::vector<std::string>& more : {run.motion.warnings, softening_warnings(with_joints(r.scene), run)})
     r.warnings.insert(r.warnings.end(), more.begin(), more.end());
   if (!r.budget.measured || r.budget.within(r.scene.tolerance)) return;
-  const std::string why = r.budget.missing.empty() ? fmt::format("the errors add up to {:.1e}", r.budget.total())
-                                                   : fmt::format("{}", fmt::join(r.budget.missing, "; "));
+  const std::string why =
+      r.budget.missing.empty()
+          ? fmt::format("the errors add up to {:.1e}{}", r.budget.total(),
+                        r.budget.worst() ? fmt::format(" in {}", description(*r.budget.worst())) : "")
+          : fmt::format("{}", fmt::join(r.budget.missing, "; "));
   r.warnings.push_back(
       fmt::format("the accuracy wanted, {:.1e}, was not reached or not proven: {}", r.scene.tolerance, why));
 }

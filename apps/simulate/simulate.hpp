@@ -3,6 +3,7 @@
 #include "apps/model/prepared_body.hpp"
 #include "apps/scene/scene.hpp"
 #include "apps/simulate/flight_state.hpp"
+#include "apps/simulate/output_errors.hpp"
 #include "dynamics/methods/integrator.hpp"
 #include "dynamics/simulation/tree_integrator.hpp"
 
@@ -16,25 +17,6 @@
 #include <vector>
 
 namespace flexboom {
-
-/// Four separate errors of a run, each relative to the outputs wanted (README of apps: what each is compared with).
-/// What was not measured is unknown (NaN), and then so is the total.
-struct ErrorBudget {
-  double discretisation = unknown;
-  double truncation = unknown;
-  double time = unknown;
-  double linearisation = unknown;
-  std::vector<std::string> missing;  // which part was not measured and why, one line each
-  bool measured = false;             // false: the repeats were not run, or not to their end
-  double total() const { return discretisation + truncation + time + linearisation; }
-  bool within(double tolerance) const { return total() <= tolerance; }
-};
-
-/// Names and values of the outputs of a run, one row per time: the columns of trajectory.csv.
-struct OutputTable {
-  std::vector<std::string> names;
-  Eigen::MatrixXd values;  // rows: times
-};
 
 /// Energies at the end of a run, by where they are and where they went [J].
 struct EnergyOfRun {
@@ -123,17 +105,5 @@ Flight rows_of(const Flight& f, size_t first, size_t last) {
   r.events = f.events, r.summary = f.summary;
   return r;
 }
-
-/// Largest relative difference over the wanted outputs that both tables have (all when `wanted` is empty): for each
-/// output, a vector counting as one, max over time of |a - b| over max |b|.
-struct OutputDifference {
-  std::string name;
-  double error = 0;
-};
-std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
-                                              const std::vector<std::string>& wanted);
-
-/// The largest of them.
-double largest(const std::vector<OutputDifference>&);
 
 }  // namespace flexboom

@@ -1,0 +1,159 @@
+#include "apps/simulate/output_errors.hpp"
+
+#include "dynamics/numerics/rotation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace flexboom {
+
+using Eigen::Index;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+namespace {
+
+/// What follows the last dot.
+std::string last_word(const std::string& column) {
+  const auto dot = column.rfind('.');
+  return dot == std::string::npos ? column : column.substr(dot + 1);
+}
+
+/// "sip.q2" -> "sip.q", "hub.rotation.x" -> "hub.rotation", "sip.angle" -> "sip.angle".
+std::string output_of_column(const std::string& column) {
+  const std::string last = last_word(column);
+  if (last.size() == column.size()) return column;
+  const std::string first = column.substr(0, column.size() - last.size() - 1);
+  if (last == "x" || last == "y" || last == "z") return first;
+  if (last.size() > 1 && last[0] == 'q' && std::isdigit(static_cast<unsigned char>(last[1]))) return first + ".q";
+  return column;
+}
+
+bool is_wanted(const std::string& output, const std::vector<std::string>& wanted) {
+  if (output == "t" || output.starts_with("energy.") || output.starts_with("lvlh.")) return false;
+  return wanted.empty() || std::find(wanted.begin(), wanted.end(), output) != wanted.end();
+}
+
+/// Angle of the rotation that leads from one rotation vector to another: their difference jumps where the angle passes
+/// pi.
+double angle_between(const Vector3d& a, const Vector3d& b) {
+  return rotation_vector(quaternion_product(quaternion_of(-a), quaternion_of(b))).norm();
+}
+
+using ColumnPlaces = std::vector<Index>;
+
+VectorXd values_at(const OutputTable& table, Index row, const ColumnPlaces& columns) {
+  VectorXd r(std::ssize(columns));
+  for (size_t k = 0; k < columns.size(); ++k) r[static_cast<Index>(k)] = table.values(row, columns[k]);
+  return r;
+}
+
+/// The largest value of each unit, over all outputs of a table.
+std::map<std::string_view, double> largest_of_units(const OutputTable& table) {
+  std::map<std::string_view, double> r;
+  for (size_t i = 0; i < table.names.size(); ++i) {
+    const std::string_view unit = unit_of(output_of_column(table.names[i]));
+    if (unit.empty() || table.values.rows() == 0) continue;
+    r[unit] = std::max(r[unit], table.values.col(static_cast<Index>(i)).cwiseAbs().maxCoeff());
+  }
+  return r;
+}
+
+/// An error of this size is no more than round-off, or does not count.
+double bearable(const std::string& output, const OutputFloors& floors, const std::map<std::string_view, double>& all) {
+  const std::string_view unit = unit_of(output);
+  const auto found = all.find(unit);
+  double natural = found == all.end() ? 0 : found->second;
+  if (unit == "rad") natural = std::max(natural, 1.0);
+  if (unit == "m") natural = std::max(natural, floors.length);
+  constexpr double round_off = 1e-14;
+  double size = round_off * natural;
+  for (const AbsoluteError& a : floors.absolute)
+    if (a.unit == unit) size = std::max(size, a.size);
+  return size;
+}
+
+}  // namespace
+
+std::string_view unit_of(const std::string& output) {
+  static const std::map<std::string, std::string_view> units = {
+      {"angle", "rad"},  {"angle1", "rad"},  {"angle2", "rad"},   {"rotation", "rad"}, {"pointing", "rad"},
+      {"rate", "rad/s"}, {"rate1", "rad/s"}, {"rate2", "rad/s"},  {"spin", "rad/s"},   {"length", "m"},
+      {"position", "m"}, {"tip", "m"},       {"velocity", "m/s"}, {"force", "N"},      {"torque", "N m"}};
+  const auto found = units.find(last_word(output));
+  return found == units.end() ? "" : found->second;
+}
+
+std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
+                                              const std::vector<std::string>& wanted, const OutputFloors& floors) {
+  std::vector<std::string> order;
+  std::map<std::string, std::pair<ColumnPlaces, ColumnPlaces>> columns;
+  Index time = -1;
+  for (size_t i = 0; i < a.names.size(); ++i) {
+    if (a.names[i] == "t") time = static_cast<Index>(i);
+    const auto j = std::find(b.names.begin(), b.names.end(), a.names[i]);
+    const std::string output = output_of_column(a.names[i]);
+    if (j == b.names.end() || !is_wanted(output, wanted)) continue;
+    if (!columns.contains(output)) order.push_back(output);
+    columns[output].first.push_back(static_cast<Index>(i));
+    columns[output].second.push_back(j - b.names.begin());
+  }
+  const std::map<std::string_view, double> all = largest_of_units(b);
+  const Index rows = std::min(a.values.rows(), b.values.rows());
+  std::vector<OutputDifference> result;
+  for (const std::string& output : order) {
+    const auto& [of_a, of_b] = columns[output];
+    OutputDifference d;
+    d.name = output;
+    double difference = 0;
+    for (Index row = 0; row < rows; ++row) {
+      const VectorXd u = values_at(a, row, of_a), v = values_at(b, row, of_b);
+      const double here = output.ends_with(".rotation") ? angle_between(u, v) : (u - v).norm();
+      d.scale = std::max(d.scale, v.norm());
+      if (here > difference) difference = here, d.time = time < 0 ? 0 : a.values(row, time);
+    }
+    d.scale = std::max(d.scale, bearable(output, floors, all) / floors.tolerance);
+    d.error = d.scale > 0 ? difference / d.scale : difference;
+    result.push_back(d);
+  }
+  return result;
+}
+
+double largest(const std::vector<OutputDifference>& differences) {
+  double r = 0;
+  for (const OutputDifference& d : differences) r = std::max(r, d.error);
+  return r;
+}
+
+std::string description(const OutputErrors& o) {
+  const std::array<std::pair<std::string_view, double>, 4> parts = {{{"discretisation", o.discretisation},
+                                                                     {"truncation", o.truncation},
+                                                                     {"time", o.time},
+                                                                     {"linearisation", o.linearisation}}};
+  std::string_view most;
+  double size = 0;
+  for (const auto& [name, error] : parts)
+    if (error > size) most = name, size = error;
+  const std::string part = most.empty() ? "" : fmt::format(", most of it {}", most);
+  return fmt::format("{} at t = {:.6g} s{}", o.name, o.when, part);
+}
+
+const OutputErrors* ErrorBudget::worst() const {
+  const OutputErrors* r = nullptr;
+  for (const OutputErrors& o : outputs)
+    if (r == nullptr || std::isnan(o.total()) || o.total() > r->total()) r = &o;
+  return r;
+}
+
+double ErrorBudget::total() const {
+  const OutputErrors* w = worst();
+  return w != nullptr ? w->total() : discretisation + truncation + time + linearisation;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,81 @@
+#pragma once
+
+#include "apps/scene/absolute_error.hpp"
+#include "dynamics/events/flight.hpp"
+
+#include <Eigen/Core>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// How far the outputs of one run are from those of another. A vector is one output: "hub.rotation" has three columns.
+namespace flexboom {
+
+/// Names and values of the outputs of a run, one row per time: the columns of trajectory.csv.
+struct OutputTable {
+  std::vector<std::string> names;
+  Eigen::MatrixXd values;  // rows: times
+};
+
+/// "m/s" of "hub.velocity"; empty of elastic coordinates, drives and energies.
+std::string_view unit_of(const std::string& output);
+
+/// What makes of an output that hardly moves no more than it is: the errors that its scale must bear.
+struct OutputFloors {
+  double tolerance = 1;                   // what relative errors are held against
+  double length = 0;                      // of the scene [m]
+  std::vector<AbsoluteError> absolute{};  // the user's
+};
+
+struct OutputDifference {
+  std::string name;
+  double error = 0;  // the largest over time, by the scale
+  double scale = 0;  // the largest value of the output over time, or its floor where that is more [its unit]
+  double time = 0;   // of the largest [s]
+};
+
+/// Over the outputs that both tables have and that are wanted (all when `wanted` is empty): max over time of |a - b|,
+/// by the largest |b| over time. With floors that is no less than what tolerance makes of an absolute error and of
+/// round-off: 1e-14 of a radian, of the scene's length, or of the largest output of the same unit.
+std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
+                                              const std::vector<std::string>& wanted, const OutputFloors& = {});
+
+/// The largest of the errors, 0 of none.
+double largest(const std::vector<OutputDifference>&);
+
+/// Errors of one output, each relative to its scale. What was not measured is unknown (NaN).
+struct OutputErrors {
+  std::string name;
+  double scale = 0;  // [its unit]
+  double discretisation = unknown, truncation = unknown, time = unknown, linearisation = unknown;
+  double when = 0;  // the largest of them is worst [s]
+
+  /// Elastic coordinates have the meaning of their own basis: nothing is left out of them, no mesh is finer.
+  bool is_of_its_basis() const { return name.ends_with(".q"); }
+  double total() const { return time + linearisation + (is_of_its_basis() ? 0 : discretisation + truncation); }
+};
+
+/// Its name, when it is worst, and the largest part where that is known: "hub.rotation at t = 3.2 s, most of it
+/// truncation".
+std::string description(const OutputErrors&);
+
+/// Four separate errors of a run (README of apps: what each is compared with), each the largest over the outputs
+/// wanted. What was not measured is unknown (NaN), and then so is the total.
+struct ErrorBudget {
+  double discretisation = unknown;
+  double truncation = unknown;
+  double time = unknown;
+  double linearisation = unknown;
+  std::vector<OutputErrors> outputs;
+  std::vector<std::string> missing;  // which part was not measured and why, one line each
+  bool measured = false;             // false: the repeats were not run, or not to their end
+
+  /// The output with the largest total, or with one that is unknown; nullptr where there is none.
+  const OutputErrors* worst() const;
+  /// Of the worst output.
+  double total() const;
+  bool within(double tolerance) const { return total() <= tolerance; }
+};
+
+}  // namespace flexboom

@@ -1,0 +1,120 @@
+#include "apps/simulate/output_errors.hpp"
+
+#include "fem/base/check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+namespace {
+
+using Eigen::MatrixXd;
+
+/// Two times; the columns of a hub that turns and of a boom that bends.
+OutputTable table(std::vector<std::string> names, std::initializer_list<double> first,
+                  std::initializer_list<double> second) {
+  OutputTable r;
+  r.names = std::move(names);
+  r.values.resize(2, std::ssize(r.names));
+  Eigen::Index row = 0;
+  for (const auto& values : {first, second}) {
+    Eigen::Index column = 0;
+    for (const double value : values) r.values(row, column++) = value;
+    ++row;
+  }
+  return r;
+}
+
+const std::vector<std::string> hub = {"t", "hub.rate.x", "hub.rate.y", "hub.rate.z"};
+const std::vector<std::string> boom = {"t", "boom.tip.x", "boom.tip.y", "boom.tip.z"};
+
+OutputDifference only(const std::vector<OutputDifference>& differences) {
+  EXPECT_EQ(differences.size(), 1u);
+  return differences.at(0);
+}
+
+TEST(OutputErrors, AVectorIsOneOutputAndItsWorstTimeIsNamed) {
+  const OutputTable a = table(hub, {0, 3, 4e-6, 0}, {1, 1, 0, 2e-6}), b = table(hub, {0, 3, 0, 0}, {1, 1, 0, 0});
+  const OutputDifference d = only(compare_outputs(a, b, {}));
+  EXPECT_EQ(d.name, "hub.rate");
+  EXPECT_EQ(d.scale, 3);
+  EXPECT_DOUBLE_EQ(d.error, 4e-6 / 3);
+  EXPECT_EQ(d.time, 0);
+}
+
+TEST(OutputErrors, WhatNoSymmetryMovesHasTheRoundOffOfTheScene) {
+  const OutputTable a = table(boom, {0, 0, 5e-15, 0}, {1, 0, -4e-15, 0}),
+                    b = table(boom, {0, 0, 0, 0}, {1, 0, 1e-15, 0});
+  EXPECT_GT(only(compare_outputs(a, b, {})).error, 1);  // 500 %, of nothing
+  EXPECT_LT(only(compare_outputs(a, b, {}, {.tolerance = 1e-6, .length = 2})).error, 1e-6);
+  // Another output of its unit may be larger than the scene is long.
+  std::vector<std::string> names = boom;
+  names.emplace_back("hub.position.x");
+  const OutputTable far_a = table(names, {0, 0, 5e-9, 0, 1e6}, {1, 0, 0, 0, 1e6});
+  const OutputTable far_b = table(names, {0, 0, 0, 0, 1e6}, {1, 0, 0, 0, 1e6});
+  EXPECT_LT(largest(compare_outputs(far_a, far_b, {}, {.tolerance = 1e-6, .length = 2})), 1e-6);
+  const OutputTable near_a = table(names, {0, 0, 5e-9, 0, 1}, {1, 0, 0, 0, 1});
+  const OutputTable near_b = table(names, {0, 0, 0, 0, 1}, {1, 0, 0, 0, 1});
+  EXPECT_GT(largest(compare_outputs(near_a, near_b, {}, {.tolerance = 1e-6, .length = 2})), 1e-3);
+}
+
+TEST(OutputErrors, AbsoluteErrorsOfAUnitDoNotCount) {
+  const OutputTable a = table(hub, {0, 1e-9, 0, 0}, {1, 1e-9, 0, 0}), b = table(hub, {0, 2e-9, 0, 0}, {1, 2e-9, 0, 0});
+  EXPECT_DOUBLE_EQ(only(compare_outputs(a, b, {})).error, 0.5);
+  const auto with = [&](const char* text) {
+    return only(compare_outputs(a, b, {}, {.tolerance = 1e-3, .absolute = {absolute_error(text)}})).error;
+  };
+  EXPECT_LE(with("1.001e-9 rad/s"), 1e-3);
+  EXPECT_GT(with("0.999e-9 rad/s"), 1e-3);
+  EXPECT_DOUBLE_EQ(with("1 rad"), 0.5);  // another unit
+}
+
+TEST(OutputErrors, AbsoluteErrorsAreNumbersWithAUnit) {
+  EXPECT_EQ(absolute_error("2e-3 N m").unit, "N m");
+  EXPECT_EQ(absolute_error("2e-3 N m").size, 2e-3);
+  for (const char* text : {"", "1e-9", "1e-9rad", "1e-9 deg", "-1 rad", "0 m", "nan m", "inf m", "rad", "1e-9 rad "})
+    EXPECT_THROW(absolute_error(text), InputError) << text;
+}
+
+TEST(OutputErrors, EveryUnitIsThatOfAnOutput) {
+  EXPECT_EQ(unit_of("hub.rotation"), "rad");
+  EXPECT_EQ(unit_of("boom.tip"), "m");
+  EXPECT_EQ(unit_of("slide.length"), "m");
+  EXPECT_EQ(unit_of("wheel.spin"), "rad/s");
+  EXPECT_EQ(unit_of("boom.q"), "");
+  EXPECT_EQ(unit_of("hinge.drive"), "");
+}
+
+TEST(ErrorBudget, TotalIsThatOfTheWorstOutput) {
+  ErrorBudget budget;
+  budget.outputs = {{"a.tip", 1, 1e-3, 1e-4, 1e-5, 1e-6, 2.0}, {"b.rate", 1, 0, 5e-3, 1e-5, 1e-6, 3.0}};
+  ASSERT_NE(budget.worst(), nullptr);
+  EXPECT_EQ(budget.worst()->name, "b.rate");
+  EXPECT_DOUBLE_EQ(budget.total(), 5.011e-3);
+  EXPECT_EQ(description(*budget.worst()), "b.rate at t = 3 s, most of it truncation");
+  EXPECT_TRUE(budget.within(6e-3));
+  EXPECT_FALSE(budget.within(5e-3));
+}
+
+TEST(ErrorBudget, WhatIsUnknownIsWorstAndNeverMet) {
+  ErrorBudget budget;
+  budget.outputs = {{"a.tip", 1, 1e-3, 1e-4, 1e-5, 1e-6, 2.0},
+                    {"b.rate", 1, 0, unknown, 1e-5, 1e-6, 3.0},
+                    {"c.rate", 1, 0, 1, 1, 1, 0}};
+  EXPECT_EQ(budget.worst()->name, "b.rate");
+  EXPECT_TRUE(std::isnan(budget.total()));
+  EXPECT_FALSE(budget.within(1e3));
+}
+
+TEST(ErrorBudget, CoordinatesHaveNoErrorsOfAnotherBasis) {
+  ErrorBudget budget;
+  budget.outputs = {{"a.q", 1, unknown, unknown, 1e-5, 1e-6, 2.0}};
+  EXPECT_DOUBLE_EQ(budget.total(), 1.1e-5);
+}
+
+}  // namespace
+}  // namespace flexboom
