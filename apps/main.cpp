@@ -83,6 +83,9 @@ struct CommandLine {
     c->add_flag("--report", run.report, "Write report.html too");
     c->add_flag("--loads", run.loads, "Force and torque of every joint as outputs: JOINT.force, JOINT.torque");
     c->add_flag("--no-budget", run.no_budget, "Do not repeat the run to measure its errors");
+    c->add_flag("--verify", run.verify,
+                "Hold the run against expensive ones that share little with it: another method, the other formulation, "
+                "more modes, finer elements");
     c->callback([this] { action = [this] { return run_command(run, common); }; });
   }
 

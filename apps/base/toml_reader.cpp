@@ -237,6 +237,7 @@ void Faults::throw_if_any() const {
     return std::tie(a.place.file, a.place.line, a.place.column) < std::tie(b.place.file, b.place.line, b.place.column);
   });
   std::vector<std::string> lines;
+  lines.reserve(sorted.size());
   for (const Fault& fault : sorted) {
     lines.push_back(where(fault.place) + (fault.path.empty() ? "" : fault.path + ": ") + fault.text);
   }
@@ -360,7 +361,7 @@ std::vector<double> TableReader::numbers(std::string_view key) {
 
 Eigen::Vector3d TableReader::vector(std::string_view key, const std::optional<Eigen::Vector3d>& otherwise) {
   if (otherwise && !has(key)) return *otherwise;
-  const Eigen::Vector3d wrong = Eigen::Vector3d::Constant(nan);
+  Eigen::Vector3d wrong = Eigen::Vector3d::Constant(nan);
   const Value* array = find(key, Kind::array, true);
   if (!array) return wrong;
   if (array->items.size() != 3) {
@@ -373,7 +374,7 @@ Eigen::Vector3d TableReader::vector(std::string_view key, const std::optional<Ei
 
 Eigen::Matrix3d TableReader::matrix(std::string_view key, const std::optional<Eigen::Matrix3d>& otherwise) {
   if (otherwise && !has(key)) return *otherwise;
-  const Eigen::Matrix3d wrong = Eigen::Matrix3d::Constant(nan);
+  Eigen::Matrix3d wrong = Eigen::Matrix3d::Constant(nan);
   const Value* array = find(key, Kind::array, true);
   if (!array) return wrong;
   const std::vector<Value>& rows = array->items;

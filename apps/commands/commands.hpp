@@ -45,6 +45,7 @@ struct RunArguments {
   bool report = false;
   bool loads = false;  // of every joint, as outputs
   bool no_budget = false;
+  bool verify = false;  // by reference runs
 };
 
 struct ModesArguments {

@@ -143,6 +143,7 @@ Scene scene_of(const RunArguments& a) {
     for (BodyScene& b : scene.bodies)
       if (b.is_boom()) b.structure = *a.structure;
   if (a.no_budget) scene.error_budget = false;
+  scene.verify = a.verify;
   if (a.loads) {
     for (HingeScene& h : scene.hinges) h.loads = true;
     for (JointScene& j : scene.joints) j.loads = j.kind != JointKind::free;
@@ -156,6 +157,20 @@ std::string measured(double value) { return std::isnan(value) ? "not measured" :
 
 std::string balances(const IntegrationSummary& s) {
   return fmt::format("energy balance {}, momentum drift {}", measured(s.energy_balance), measured(s.momentum_drift));
+}
+
+/// What reference runs say, and what was estimated of the same outputs.
+void print_checks(const RunResult& r) {
+  for (const ReferenceCheck& c : r.checks) {
+    if (!c.missing.empty()) {
+      fmt::print("verify, {}: no reference: {}\n", c.what, c.missing);
+      continue;
+    }
+    const auto worst = std::ranges::max_element(c.differences, {}, &OutputDifference::error);
+    if (worst != c.differences.end())
+      fmt::print("verify, {} ({}): differs by {:.1e} in {} at t = {:.6g} s\n", c.what, c.method, worst->error,
+                 worst->name, worst->time);
+  }
 }
 
 void print_summary(const RunResult& r, const std::filesystem::path& folder) {
@@ -172,6 +187,7 @@ void print_summary(const RunResult& r, const std::filesystem::path& folder) {
                measured(r.budget.linearisation), measured(r.budget.total()));
   if (r.budget.measured && r.budget.worst() != nullptr)
     fmt::print("worst output: {}\n", description(*r.budget.worst()));
+  print_checks(r);
   fmt::print("results: {}\n", folder.string());
 }
 

@@ -76,6 +76,19 @@ ordered_json budget_json(const ErrorBudget& b) {
   return j;
 }
 
+ordered_json checks_of_references_json(const std::vector<ReferenceCheck>& checks) {
+  ordered_json all = ordered_json::array();
+  for (const ReferenceCheck& c : checks) {
+    ordered_json outputs = ordered_json::object();
+    for (const OutputDifference& d : c.differences)
+      outputs[d.name] = {{"difference", d.error}, {"scale", d.scale}, {"worst_at", d.time}};
+    ordered_json check = {{"what", c.what}, {"method", c.method}, {"outputs", outputs}};
+    check["missing"] = c.missing.empty() ? ordered_json(nullptr) : ordered_json(c.missing);
+    all.push_back(check);
+  }
+  return all;
+}
+
 /// null: of a hub without joints.
 ordered_json energy_json(const std::optional<EnergyOfRun>& energy) {
   if (!energy) return nullptr;
@@ -148,6 +161,7 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   j["momentum_drift"] = s.momentum_drift;  // unknown is null
   j["constraint_drift"] = s.constraint_drift;
   j["error_budget"] = budget_json(r.budget);
+  if (!r.checks.empty()) j["reference_runs"] = checks_of_references_json(r.checks);
   j["accuracy_met"] = r.budget.measured && r.budget.within(r.scene.tolerance);
   j["plan"] = r.plan;
   j["warnings"] = r.warnings;

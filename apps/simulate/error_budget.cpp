@@ -11,6 +11,33 @@
 
 namespace flexboom {
 
+Scene with_more_modes(Scene scene, int times) {
+  for (BodyScene& b : scene.bodies) {
+    if (b.structure == "rigid" || !b.is_boom()) continue;
+    b.modes = b.directions == "all" ? b.modes + 4 * times : 2 * (b.modes + 2 * times);
+    b.directions = "all";
+  }
+  return scene;
+}
+
+OutputTable without_coordinates(const OutputTable& table) {
+  OutputTable r;
+  std::vector<Eigen::Index> kept;
+  for (size_t i = 0; i < table.names.size(); ++i) {
+    if (is_coordinate(table.names[i])) continue;
+    r.names.push_back(table.names[i]);
+    kept.push_back(static_cast<Eigen::Index>(i));
+  }
+  r.values = table.values(Eigen::all, kept);
+  return r;
+}
+
+Scene with_stiffening(Scene scene) {
+  for (BodyScene& b : scene.bodies)
+    if (!b.rigid && b.structure != "rigid") b.stiffening = "on";
+  return scene;
+}
+
 namespace {
 
 /// Does the model of any body leave elasticity or modes out? What is said to be rigid is.
@@ -25,24 +52,6 @@ const BodyScene* any_reduced(const Scene& scene) {
   const auto found = std::ranges::find_if(
       scene.bodies, [](const BodyScene& b) { return b.reduced && b.reduced->structure != "rigid"; });
   return found == scene.bodies.end() ? nullptr : &*found;
-}
-
-/// Two more modes in each plane, and both planes: what bends out of the hinge plane counts as left out, too.
-Scene with_more_modes(Scene scene) {
-  for (BodyScene& b : scene.bodies) {
-    if (b.structure == "rigid" || !b.is_boom()) continue;
-    b.modes = b.directions == "all" ? b.modes + 4 : 2 * (b.modes + 2);
-    b.directions = "all";
-  }
-  return scene;
-}
-
-/// Without the columns of elastic coordinates: those of another basis have other meanings.
-OutputTable without_coordinates(const OutputTable& table) {
-  OutputTable r{table.names, table.values};
-  for (std::string& name : r.names)
-    if (name.find(".q") != std::string::npos) name += " (of this basis)";
-  return r;
 }
 
 using Part = double OutputErrors::*;
@@ -137,12 +146,6 @@ double truncation_error(const Run& run, const Scene& flown, Measuring& m) {
   return m.enter(&OutputErrors::truncation, differences);
 }
 
-Scene with_stiffening(Scene scene) {
-  for (BodyScene& b : scene.bodies)
-    if (!b.rigid && b.structure != "rigid") b.stiffening = "on";
-  return scene;
-}
-
 /// What geometric stiffness changes where it is left out, and what then is left out still: of the order of the
 /// deflection squared.
 double linearisation_error(const Run& run, const Scene& flown, Measuring& m) {
@@ -164,19 +167,18 @@ double linearisation_error(const Run& run, const Scene& flown, Measuring& m) {
   return m.enter(&OutputErrors::linearisation, differences, deflection * deflection);
 }
 
-/// The largest radius of gyration of a body: what lengths of the scene are like.
-double length_of(const Run& run) {
-  double r = 0;
-  for (const PreparedBody& p : run.bodies) r = std::max(r, std::sqrt(p.body.J0.trace() / p.body.m));
-  return r;
-}
-
 }  // namespace
 
-ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
-  OutputFloors floors{scene.tolerance, length_of(run)};
+OutputFloors floors_of(const Scene& scene, const std::vector<PreparedBody>& bodies) {
+  OutputFloors floors{scene.tolerance};
+  for (const PreparedBody& p : bodies)  // the largest radius of gyration: what lengths of the scene are like
+    floors.length = std::max(floors.length, std::sqrt(p.body.J0.trace() / p.body.m));
   for (const std::string& text : scene.absolute) floors.absolute.push_back(absolute_error(text));
-  Measuring m{hooks, plan, floors};
+  return floors;
+}
+
+ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
+  Measuring m{hooks, plan, floors_of(scene, run.bodies)};
   ErrorBudget& budget = m.budget;
   Scene flown = scene;
   const BodyScene* reduced = any_reduced(scene);

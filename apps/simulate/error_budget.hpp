@@ -13,6 +13,18 @@ namespace flexboom {
 /// @throws InputError, NumericalError as run_scene.
 ErrorBudget measure_budget(const Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan);
 
+/// Two more modes in each plane, so many times, and both planes: what bends out of the hinge plane is left out, too.
+Scene with_more_modes(Scene, int times = 1);
+
+/// All geometric stiffness.
+Scene with_stiffening(Scene);
+
+/// Without the columns of elastic coordinates: those of another basis have other meanings.
+OutputTable without_coordinates(const OutputTable&);
+
+/// What the outputs of a scene with these bodies must bear.
+OutputFloors floors_of(const Scene&, const std::vector<PreparedBody>&);
+
 /// Sets the number of modes of every body that leaves it to the program: the first for which one more changes the
 /// outputs wanted by less than the tolerance.
 void choose_modes(Scene&, const RunHooks&, std::vector<std::string>& plan);

@@ -81,6 +81,8 @@ double bearable(const std::string& output, const OutputFloors& floors, const std
 
 }  // namespace
 
+bool is_coordinate(const std::string& column) { return output_of_column(column).ends_with(".q"); }
+
 std::string_view unit_of(const std::string& output) {
   static const std::map<std::string, std::string_view> units = {
       {"angle", "rad"},  {"angle1", "rad"},  {"angle2", "rad"},   {"rotation", "rad"}, {"pointing", "rad"},

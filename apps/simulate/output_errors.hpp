@@ -21,6 +21,9 @@ struct OutputTable {
 /// "m/s" of "hub.velocity"; empty of elastic coordinates, drives and energies.
 std::string_view unit_of(const std::string& output);
 
+/// Is a column an elastic coordinate, "boom.q2"?
+bool is_coordinate(const std::string& column);
+
 /// What makes of an output that hardly moves no more than it is: the errors that its scale must bear.
 struct OutputFloors {
   double tolerance = 1;                   // what relative errors are held against
@@ -43,6 +46,14 @@ std::vector<OutputDifference> compare_outputs(const OutputTable& a, const Output
 
 /// The largest of the errors, 0 of none.
 double largest(const std::vector<OutputDifference>&);
+
+/// What a run that shares little with this one says of its outputs.
+struct ReferenceCheck {
+  std::string what;
+  std::string method;  // that it took
+  std::vector<OutputDifference> differences;
+  std::string missing;  // why it has none
+};
 
 /// Errors of one output, each relative to its scale. What was not measured is unknown (NaN).
 struct OutputErrors {

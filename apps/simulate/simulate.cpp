@@ -4,6 +4,7 @@
 #include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/multipliers_flight.hpp"
 #include "apps/simulate/tree_flight.hpp"
+#include "apps/simulate/verify.hpp"
 #include "dynamics/numerics/rotation.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
@@ -243,6 +244,7 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks,
   }
   add_warnings(run, r);
   take(std::move(run), r);
+  if (r.scene.verify && !r.trajectory.summary.interrupted) r.checks = reference_checks(r, hooks);
   return r;
 }
 

@@ -34,7 +34,8 @@ struct RunResult {
   FlightState end;                    // from which another run can go on
   std::optional<EnergyOfRun> ledger;  // of a scene with joints
   ErrorBudget budget;
-  std::vector<std::string> plan;  // what was chosen and why, one line each
+  std::vector<ReferenceCheck> checks;  // where the scene is to be verified
+  std::vector<std::string> plan;       // what was chosen and why, one line each
   std::vector<std::string> warnings;
   double prepare_seconds = 0;
   double integrate_seconds = 0;  // of the run itself, without the repeats

@@ -70,8 +70,9 @@ bool moves_inertia(const tree::Link& link, const tree::LinkScratch<double>& s, i
 /// Is the mass matrix over the coordinates of the body positive definite?
 bool has_modal_mass(const tree::Link& link, const tree::LinkScratch<double>& s) {
   if (!link.b.moves()) return !link.second_order || s.second_order.least_pivot > 0;
-  for (int k = 0; k < link.body.n; ++k)
-    if (!(s.M[static_cast<size_t>(k * (link.body.n + 1))] > 0)) return false;
+  const auto n = static_cast<size_t>(link.body.n);
+  for (size_t k = 0; k < n; ++k)
+    if (!(s.M[k * (n + 1)] > 0)) return false;
   return true;
 }
 
@@ -190,8 +191,8 @@ TreeState Tree::at_rest() const {
     s.joints.push_back(std::move(state));
   }
   for (const ReducedBody& body : impl_->scene.bodies) {
-    s.q.push_back(VectorXd::Zero(body.n()));
-    s.q_dot.push_back(VectorXd::Zero(body.n()));
+    s.q.emplace_back(VectorXd::Zero(body.n()));
+    s.q_dot.emplace_back(VectorXd::Zero(body.n()));
   }
   for (const ReactionWheel& wheel : impl_->scene.wheels) s.spin.push_back(wheel.spin);
   return s;

@@ -161,11 +161,12 @@ class Reader {
     return buffer.strings().front();
   }
 
-  std::vector<std::string> list(hid_t group, const std::string& name) const {
+  static std::vector<std::string> list(hid_t group, const std::string& name) {
     std::vector<std::string> items;
     for (std::string item = "item_0"; H5Lexists(group, item.c_str(), H5P_DEFAULT) > 0;
          item = "item_" + std::to_string(items.size())) {
-      const std::string full = name + "/" + item;
+      std::string full = name;
+      full += '/', full += item;
       const Handle dataset = handle(H5Dopen2(group, item.c_str(), H5P_DEFAULT), H5Dclose, "open " + full);
       items.push_back(text(dataset, full));
     }

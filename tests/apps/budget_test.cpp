@@ -2,6 +2,7 @@
 
 #include "apps/commands/commands.hpp"
 #include "apps/results/results.hpp"
+#include "apps/simulate/error_budget.hpp"
 #include "reduction/body_file/body_file.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
@@ -201,6 +202,16 @@ std::function<void(ReducedBody&)> called(const std::string& name) {
     for (MarkerStiffness& m : body.Kg.markers)
       if (m.marker == "tip") m.marker = name;
   };
+}
+
+/// Two bases have other coordinates by the same names.
+TEST(Budget, CoordinatesOfOtherBasesAreNotCompared) {
+  OutputTable table;
+  table.names = {"t", "boom.q1", "boom.q2", "boom.tip.y"};
+  table.values = Eigen::MatrixXd::Ones(2, 4);
+  const OutputTable kept = without_coordinates(table);
+  EXPECT_EQ(kept.names, (std::vector<std::string>{"t", "boom.tip.y"}));
+  EXPECT_EQ(kept.values.cols(), 2);
 }
 
 TEST(Tip, IsFoundWhateverItsSpelling) {

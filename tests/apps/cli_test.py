@@ -538,6 +538,23 @@ class RunFiles(Case):
             self.assertEqual(budget[part], max(o[part] or 0 for o in budget["outputs"].values()), part)
         self.assertTrue(all(isinstance(line, str) for line in document["plan"]))
 
+    def test_verify_holds_the_run_against_others(self):
+        """What is estimated is what runs that share little with this one say."""
+        result = flexboom("run", "sport", "--duration", "0.3", "--tolerance", "1e-4", "--verify", "--out", self.folder / "out")
+        self.assert_exit(OK, result)
+        self.assertEqual(result.stdout.count("verify, "), 6)
+        summary = self.summary(self.folder / "out")
+        checks = {c["what"].split(":")[0] + c["what"].split(":")[-1]: c for c in summary["reference_runs"]}
+        self.assertEqual(len(checks), 6)
+        budget = summary["error_budget"]["outputs"]
+        for what, check in checks.items():
+            self.assertIsNone(check["missing"], what)
+            for name, output in check["outputs"].items():
+                part = {"time": "time", "truncation": "truncation", "linearisation": "linearisation"}.get(what.split(" ")[0])
+                if part:
+                    self.assertLess(output["difference"], 3 * budget[name][part] + 1e-5, (what, name))
+        self.assertFalse([n for n in checks["all at onceall at once"]["outputs"] if n.endswith(".q")])
+
     def test_budget_not_measured_is_null(self):
         budget = self.summary(self.run_sport("--duration", "0.1"))["error_budget"]
         self.assertEqual(set(budget.values()), {None})

@@ -1,0 +1,79 @@
+#include "apps/simulate/verify.hpp"
+
+#include "apps/simulate/error_budget.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <stdexcept>
+#include <utility>
+
+namespace flexboom {
+
+namespace {
+
+/// A method of another family than the one that was used.
+std::string other_method(const std::string& used) {
+  if (used == "ida") return "auto";  // in relative coordinates
+  return used == "exponential" || used == "dirk" ? "bdf" : "dirk";
+}
+
+Scene by_another_method(Scene scene, const std::string& used) {
+  scene.integrator = other_method(used);
+  if (used == "ida") scene.formulation = "relative";
+  return scene;
+}
+
+Scene in_the_other_formulation(Scene scene) {
+  scene.formulation = scene.formulation == "multipliers" ? "relative" : "multipliers";
+  scene.integrator = "auto";
+  scene.rescale_at_events = false;  // only relative coordinates have it
+  return scene;
+}
+
+struct Reference {
+  std::string what;
+  Scene scene;
+  int refine = 0;
+  bool other_basis = false;
+};
+
+std::vector<Reference> references(const Scene& scene, const std::string& used) {
+  constexpr int more_orders = 4, more_modes = 3;  // times two in each plane
+  const Scene modes = with_more_modes(scene, more_modes);
+  return {{"time: another method", by_another_method(scene, used)},
+          {"time: the other formulation", in_the_other_formulation(scene)},
+          {"truncation: six more modes in each plane", modes, 0, true},
+          {"discretisation: elements of four orders more", scene, more_orders, true},
+          {"linearisation: all geometric stiffness", with_stiffening(scene), 0, true},
+          {"all at once", by_another_method(with_stiffening(modes), used), more_orders, true}};
+}
+
+}  // namespace
+
+std::vector<ReferenceCheck> reference_checks(const RunResult& r, const RunHooks& hooks) {
+  Scene scene = r.scene;
+  scene.tolerance = std::max(1e-12, std::min(scene.tolerance / 100, 1e-9));  // its own error of time is none
+  OutputFloors floors = floors_of(r.scene, r.bodies);
+  RunHooks quiet;
+  quiet.interrupt = hooks.interrupt;
+  std::vector<ReferenceCheck> checks;
+  for (const Reference& reference : references(scene, r.trajectory.summary.method)) {
+    if (hooks.interrupt != nullptr && hooks.interrupt->load()) break;
+    ReferenceCheck check;
+    check.what = reference.what;
+    try {
+      const Run run = run_once(reference.scene, quiet, reference.refine);
+      check.method = run.motion.summary.method;
+      const auto of = [&](const OutputTable& table) {
+        return reference.other_basis ? without_coordinates(table) : table;
+      };
+      check.differences = compare_outputs(of(r.outputs), of(run.outputs), scene.outputs, floors);
+    } catch (const std::runtime_error& e) {
+      check.missing = e.what();
+    }
+    checks.push_back(std::move(check));
+  }
+  return checks;
+}
+
+}  // namespace flexboom
