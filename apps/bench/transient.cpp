@@ -29,6 +29,7 @@ Scene sport(int modes, double duration) {
 std::vector<Case> cases(const std::vector<std::string>& scenes) {
   if (!scenes.empty()) {
     std::vector<Case> list;
+    list.reserve(scenes.size());
     for (const std::string& name : scenes) {
       list.push_back({name, load_scene(name), "bdf"});
     }

@@ -99,6 +99,7 @@ int compare_command(const CompareArguments& a, const CommonOptions& common) {
     if (!a.no_transient) transients = compare_transients(scene);
   }
   std::vector<BodyComparison> compared;
+  compared.reserve(bodies.size());
   for (const BodyScene& b : bodies) compared.push_back(compare_with_eq14(b, a.count, a.elements));
   // The finest row is judged: the coarser ones show how the error falls.
   const bool passed = std::all_of(compared.begin(), compared.end(),

@@ -21,6 +21,7 @@ std::string plain(std::string title) {
 std::vector<KeySection> sections_of(const std::string& name) {
   std::vector<KeySection> all = key_sections();
   std::vector<std::string> titles;
+  titles.reserve(all.size());
   for (const KeySection& s : all) titles.push_back(plain(s.title));
   const std::string wanted = plain(name);
   std::erase_if(all, [&](const KeySection& s) {

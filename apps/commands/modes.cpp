@@ -27,7 +27,7 @@ double peak_memory_mb() {
 }
 
 /// Wall time and peak memory of the stages, one after another.
-class Stages {
+class Stages {  // NOLINT(bugprone-exception-escape): of maps that are moved
  public:
   void end(const std::string& name) {
     const auto now = std::chrono::steady_clock::now();

@@ -114,7 +114,7 @@ const std::vector<PlotOf>& plots_of_columns() {
 }
 
 bool is_part(std::string_view column, std::string_view part) {
-  return part.ends_with('.') ? column.find(part) != column.npos : column.ends_with(part);
+  return part.ends_with('.') ? column.find(part) != std::string_view::npos : column.ends_with(part);
 }
 
 /// Columns that stay zero are left out.

@@ -132,7 +132,7 @@ void damping_keys(Archive& a, DampingRule& d) {
   if (a.reader()) d = {};
   a.choice({"rule", "", "damping of the elastic coordinates", required}, damping_rules, d.name);
   const bool by_value = a.reader() && (d.name == "modal" || d.name == "loss-factor");
-  a.key({"value", "", "of `\"modal\"` the damping ratio of every mode, of `\"loss-factor\"` twice that", by_value},
+  a.key({"value", "", R"(of `"modal"` the damping ratio of every mode, of `"loss-factor"` twice that)", by_value},
         d.value, not_negative);
   a.key({"alpha", "1/s", "of `\"rayleigh\"`: damping alpha M + beta K"}, d.alpha, not_negative);
   a.key({"beta", "s", "of `\"rayleigh\"`"}, d.beta, not_negative);
@@ -152,8 +152,7 @@ void grading_keys(Archive& a, SolidGrading& g) {
 
 void solid_keys(Archive& a, SolidOptions& o) {
   a.key({"element", "",
-         "`\"hex\"`, or `\"hex8\"`, `\"hex8-reduced\"`, `\"hex20\"`, `\"hex20-reduced\"`, `\"hex27\"`, `\"tet4\"`, "
-         "`\"tet10\"`"},
+         R"(`"hex"`, or `"hex8"`, `"hex8-reduced"`, `"hex20"`, `"hex20-reduced"`, `"hex27"`, `"tet4"`, `"tet10"`)"},
         o.element);
   a.key({"accuracy", "",
          "relative error wanted in the first ten frequencies of a clamped boom, 1e-8 or more; what is left open is "
@@ -173,7 +172,7 @@ void basis_keys(Archive& a, BasisOptions& b) {
       {"interfaces", "",
        "of `\"craig-bampton\"`: node sets with coordinates of their own; `\"tip:distributing\"` leaves a face free to "
        "deform",
-       false, "`[\"root\", \"tip\"]`"},
+       false, R"(`["root", "tip"]`)"},
       b.interfaces);
   a.key({"reference", "", "of `\"craig-bampton\"`: the interface that carries the frame", false, "`\"root\"`"},
         b.reference);
@@ -184,19 +183,18 @@ void basis_keys(Archive& a, BasisOptions& b) {
         b.hinge_stiffness, stiffnesses);
   a.key({"hinge_axis", "", "of `\"hinge\"`: axis through the root", false, "that of the hinge"}, b.hinge_axis,
         some_direction);
-  a.key({"corrections", "", "static shapes of unit loads beside the modes: `\"tip.Fy\"`, `\"root.Mz\"`"},
-        b.corrections);
+  a.key({"corrections", "", R"(static shapes of unit loads beside the modes: `"tip.Fy"`, `"root.Mz"`)"}, b.corrections);
 }
 
 /// What a scene may also say of a body whose geometry comes from a file.
 void model_keys(Archive& a, BodyScene& b) {
   static const std::vector<std::string_view> backends = [] {
     std::vector<std::string_view> names = names_of(eigen_backends());
-    names.push_back("auto");
+    names.emplace_back("auto");
     return names;
   }();
   a.choice({"structure", "", "model of the body"}, structures, b.structure);
-  a.key({"clamp", "", "node set that is fixed: `\"root\"`, `\"tip\"` or the name of an attachment"}, b.clamp);
+  a.key({"clamp", "", R"(node set that is fixed: `"root"`, `"tip"` or the name of an attachment)"}, b.clamp);
   NumberOrWord modes{static_cast<double>(b.modes), b.modes_auto ? "auto" : "", true};
   a.choice_or_number({"modes", "", "number of modes, 0 to 10000"}, mode_words, modes, mode_count);
   if (KeyReader* reader = a.reader()) {

@@ -23,7 +23,7 @@ struct Key {
   std::string_view unit;  // empty: none
   std::string_view what;  // for the tables of meshes/README.md
   bool required = false;
-  std::string_view otherwise = "";               // the default in words, where it is not that of the struct
+  std::string_view otherwise{};                  // the default in words, where it is not that of the struct
   std::span<const std::string_view> words = {};  // that a text may be; empty: any
 };
 

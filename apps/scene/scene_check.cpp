@@ -66,7 +66,7 @@ void check_accuracy(Faults& faults, const Scene& scene) {
 void check_integrator(Faults& faults, const Scene& scene) {
   const bool redundant = scene.formulation == "multipliers";
   std::vector<std::string_view> methods = {"auto"};
-  if (redundant) methods.push_back("ida");
+  if (redundant) methods.emplace_back("ida");
   for (const IntegratorMethod& m : integrator_methods())
     if (!redundant) methods.push_back(m.name);
   check_name_among(faults, "integrator.method", scene.integrator, methods);
@@ -150,7 +150,7 @@ void check_connections(Faults& faults, const Scene& scene) {
     const BodyScene& body = scene.bodies[i];
     const std::string path = fmt::format("bodies[{}]", i);
     if (!hinged.contains(body.name)) {
-      faults.add(path, fmt::format("\"{0}\" has no hinge; give [[hinges]] with body = \"{0}\"", body.name));
+      faults.add(path, fmt::format(R"("{0}" has no hinge; give [[hinges]] with body = "{0}")", body.name));
     }
   }
 }

@@ -45,6 +45,7 @@ void semidefinite(toml_reader::Faults&, const std::string& path, const Eigen::Ma
 template <class Table>
 std::vector<std::string_view> names_of(const Table& table) {
   std::vector<std::string_view> names;
+  names.reserve(std::size(table));
   for (const auto& row : table) names.push_back(row.name);
   return names;
 }

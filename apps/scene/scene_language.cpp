@@ -78,7 +78,7 @@ void absolute_errors(Faults& faults, const std::string& path, const std::vector<
 void accuracy_keys(Archive& a, Scene& s) {
   a.key({"tolerance", "", "relative error wanted in the outputs, 1e-14 to 0.1"}, s.tolerance, tolerance);
   a.key({"outputs", "", "columns whose errors count, a vector being one: `\"hub.rotation\"`", false, "all"}, s.outputs);
-  a.key({"absolute", "", "errors that do not count, with their unit: `[\"1e-9 rad\", \"1e-6 m\"]`", false, "none"},
+  a.key({"absolute", "", R"(errors that do not count, with their unit: `["1e-9 rad", "1e-6 m"]`)", false, "none"},
         s.absolute, absolute_errors);
   a.key({"budget", "", "whether the run is repeated to measure its errors"}, s.error_budget);
 }

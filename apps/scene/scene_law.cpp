@@ -39,7 +39,7 @@ LawState law_state_of(const std::string& text) {
   std::istringstream words(text);
   std::array<std::string, 7> w;
   for (std::string& word : w) words >> word;
-  const auto motion = std::ranges::find(law_motions, w[0]);
+  const auto* const motion = std::ranges::find(law_motions, w[0]);
   bool good = !words.fail() && motion != law_motions.end() && (w[1] == "upper" || w[1] == "lower" || w[1] == "-") &&
               (w[2] == "latched" || w[2] == "-") && (w[3] == "past" || w[3] == "-");
   const auto flags = [&](const std::string& word) {

@@ -75,6 +75,7 @@ struct Measuring {
       const auto d = std::ranges::find(differences, o.name, &OutputDifference::name);
       const double error = d == differences.end() ? 0 : d->error, before = worst_part(o);
       o.*part = error + more;
+      if (d != differences.end()) o.scale = std::max(o.scale, d->scale);
       if (error > before) o.when = d->time;
     }
     return largest(differences) + more;
@@ -111,13 +112,8 @@ double settle_time_error(const Scene& scene, Scene& flown, Run& run, Measuring& 
     const std::vector<OutputDifference> differences =
         compare_outputs(run.outputs, finer.outputs, scene.outputs, m.floors);
     const double error = largest(differences);
-    if (error <= scene.tolerance || i == most || m.stopped() || tight.tolerance < 1e-13) {
-      for (const OutputDifference& d : differences) {
-        m.budget.outputs.push_back({});
-        m.budget.outputs.back().name = d.name, m.budget.outputs.back().scale = d.scale;
-      }
+    if (error <= scene.tolerance || i == most || m.stopped() || tight.tolerance < 1e-13)
       return m.enter(&OutputErrors::time, differences);
-    }
     run = std::move(finer);
     flown = tight;
     m.plan.push_back(fmt::format(
@@ -146,24 +142,67 @@ double truncation_error(const Run& run, const Scene& flown, Measuring& m) {
   return m.enter(&OutputErrors::truncation, differences);
 }
 
-/// What geometric stiffness changes where it is left out, and what then is left out still: of the order of the
-/// deflection squared.
-double linearisation_error(const Run& run, const Scene& flown, Measuring& m) {
-  bool left_out = false;
-  double deflection = 0;
-  const std::vector<BodyScene> bodies = with_joints(flown).bodies;
+/// The scene with the geometric stiffness that its run had: a repeat changes one thing alone.
+Scene as_flown(Scene scene, const Run& run) {
+  for (BodyScene& b : scene.bodies) {
+    const auto body = std::ranges::find(run.bodies, b.name, [](const PreparedBody& p) { return p.body.name; });
+    if (b.stiffening != "auto" || body == run.bodies.end()) continue;
+    const auto index = static_cast<int>(body - run.bodies.begin());
+    b.stiffening = run.tree->stiffening(index) == Stiffening::off ? "off" : "on";
+  }
+  return scene;
+}
+
+/// All that the scene leaves to the program.
+Scene with_stiffening_left_open(const Scene& scene, Scene flown) {
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].stiffening == "auto") flown.bodies[i].stiffening = "on";
+  return flown;
+}
+
+/// Is there any that is off?
+bool any_open_stiffening(const Scene& scene, const Scene& flown) {
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].stiffening == "auto" && flown.bodies[i].stiffening == "off") return true;
+  return false;
+}
+
+bool leaves_stiffening_out(const Run& run) {
+  for (size_t i = 0; i < run.bodies.size(); ++i)
+    if (run.bodies[i].body.n() > 0 && run.tree->stiffening(static_cast<int>(i)) == Stiffening::off) return true;
+  return false;
+}
+
+/// A body of which nobody knows what geometric stiffness would do; nullptr: there is none.
+const ReducedBody* any_without_stiffness(const Run& run, const Scene& scene) {
+  const std::vector<BodyScene> bodies = with_joints(scene).bodies;
   for (size_t i = 0; i < run.bodies.size(); ++i) {
     const ReducedBody& body = run.bodies[i].body;
-    if (body.n() == 0) continue;
-    if (body.Kg.spin.empty() && (body.structure == "eq14" || !bodies[i].is_boom())) {
-      m.missing("linearisation", fmt::format("body {} has no geometric stiffness", body.name));
-      return unknown;
-    }
-    left_out = left_out || run.tree->stiffening(static_cast<int>(i)) == Stiffening::off;
-    deflection = std::max(deflection, run.bending[i].of_length);
+    if (body.n() > 0 && body.Kg.spin.empty() && (body.structure == "eq14" || !bodies[i].is_boom())) return &body;
   }
-  const std::vector<OutputDifference> differences =
-      left_out ? change(run, with_stiffening(flown), 0, m) : std::vector<OutputDifference>();
+  return nullptr;
+}
+
+/// What geometric stiffness changes where it is left out, and what then is left out still: of the order of the
+/// deflection squared. Where it changes too much and the scene leaves it open, a run with it takes the place of `run`.
+double linearisation_error(const Scene& scene, Scene& flown, Run& run, Measuring& m) {
+  if (const ReducedBody* body = any_without_stiffness(run, flown)) {
+    m.missing("linearisation", fmt::format("body {} has no geometric stiffness", body->name));
+    return unknown;
+  }
+  std::vector<OutputDifference> differences;
+  if (leaves_stiffening_out(run)) differences = change(run, with_stiffening(flown), 0, m);
+  const double bearable = scene.tolerance / 3;
+  if (largest(differences) > bearable && any_open_stiffening(scene, flown)) {
+    flown = with_stiffening_left_open(scene, std::move(flown));
+    run = run_once(flown, m.hooks);
+    m.plan.push_back(fmt::format("geometric stiffness changes the outputs by {:.1e}: the run that is kept has it",
+                                 largest(differences)));
+    differences.clear();
+    if (leaves_stiffening_out(run)) differences = change(run, with_stiffening(flown), 0, m);
+  }
+  double deflection = 0;
+  for (const Bending& b : run.bending) deflection = std::max(deflection, b.of_length);
   return m.enter(&OutputErrors::linearisation, differences, deflection * deflection);
 }
 
@@ -180,11 +219,16 @@ OutputFloors floors_of(const Scene& scene, const std::vector<PreparedBody>& bodi
 ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
   Measuring m{hooks, plan, floors_of(scene, run.bodies)};
   ErrorBudget& budget = m.budget;
-  Scene flown = scene;
+  Scene flown = as_flown(scene, run);
+  for (const OutputDifference& d : compare_outputs(run.outputs, run.outputs, scene.outputs, m.floors)) {
+    budget.outputs.push_back({});
+    budget.outputs.back().name = d.name, budget.outputs.back().scale = d.scale;
+  }
+  budget.linearisation = m.measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
   const BodyScene* reduced = any_reduced(scene);
   const std::string finished =
       reduced ? fmt::format("body {} was reduced before, and its file has no more", reduced->name) : "";
-  budget.time = m.measured("time", [&] { return settle_time_error(scene, flown, run, m); });
+  if (!m.stopped()) budget.time = m.measured("time", [&] { return settle_time_error(scene, flown, run, m); });
   const auto none = [&m](Part part) { return m.enter(part, {}); };
   if (!m.stopped()) {
     if (reduced)
@@ -205,8 +249,6 @@ ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, 
     else
       budget.discretisation = none(&OutputErrors::discretisation);
   }
-  if (!m.stopped())
-    budget.linearisation = m.measured("linearisation", [&] { return linearisation_error(run, flown, m); });
   budget.measured = !m.stopped();
   for (const std::string& line : budget.missing) plan.push_back("error budget: " + line);
   return budget;

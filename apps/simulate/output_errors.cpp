@@ -29,7 +29,7 @@ std::string last_word(const std::string& column) {
 std::string output_of_column(const std::string& column) {
   const std::string last = last_word(column);
   if (last.size() == column.size()) return column;
-  const std::string first = column.substr(0, column.size() - last.size() - 1);
+  std::string first = column.substr(0, column.size() - last.size() - 1);
   if (last == "x" || last == "y" || last == "z") return first;
   if (last.size() > 1 && last[0] == 'q' && std::isdigit(static_cast<unsigned char>(last[1]))) return first + ".q";
   return column;

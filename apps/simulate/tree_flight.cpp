@@ -147,8 +147,9 @@ void add_turns(const Scene& scene, Multibody& r) {
   }
   const Matrix3d J = inertia_at_start(scene, Tree(r), body), share = axes.inverse();
   const auto torque = std::make_shared<const WheelTorques>(wheel_torques(J, turns_of(scene.turns)));
-  for (size_t i = 0; i < wheels.size(); ++i) {
-    wheels[i]->torque = [torque, row = Eigen::RowVector3d(share.row(static_cast<Eigen::Index>(i)))](double t) {
+  Eigen::Index number = 0;
+  for (ReactionWheel* wheel : wheels) {
+    wheel->torque = [torque, row = Eigen::RowVector3d(share.row(number++))](double t) {
       double sum = 0;
       for (int k = 0; k < 3; ++k) sum += row[k] * torque->torque[static_cast<size_t>(k)].function.value(t);
       return sum;

@@ -106,7 +106,7 @@ double Laws::open(const Law& law, double place) const {
   return std::max(noise, round_off_ * std::max(1.0, std::abs(place)));
 }
 
-Laws::Bounds Laws::bounds(const Law& law) const {
+Laws::Bounds Laws::bounds(const Law& law) {
   const double friction = law.model.friction ? law.model.friction->breakaway : 0;
   Bounds b = {-friction, friction};
   if (law.state.latched || law.state.rests_at > 0) b.upper = infinite;

@@ -106,7 +106,7 @@ class Laws {
   void arm();
   double still(const Law&) const;
   double open(const Law&, double place) const;
-  Bounds bounds(const Law&) const;
+  static Bounds bounds(const Law&);
   void event(const Law&, double t, EventKind, double rate, bool contact = false);
   void apply(LawMotion&, const LawSwitch&, int direction, double t);
   void apply_ramp(Law&, std::size_t ramp, bool beyond, double rate, double t);
@@ -115,7 +115,7 @@ class Laws {
   void let_go(Law&, double load, double t);
   bool let_go_what_slips(LawMotion&, double t);
   void hit(LawMotion&, Law&, double t);
-  bool is_captured(LawMotion&, Law&, double rate) const;
+  bool is_captured(LawMotion&, Law&, double rebound) const;
   void strike(LawMotion&, Law&, double new_rate, LawLoss);
   void follow_rates(LawMotion&, double t);
 

@@ -225,7 +225,7 @@ class ExponentialStepper final : public Stepper {
       return std::make_unique<LinearPart>(J, omegas, base);
     } catch (const NumericalError&) {  // several that are pulled by each other alone
       for (const auto& [value, rate] : layout_.coordinates) J(rate, value) -= pull;
-      return std::make_unique<LinearPart>(std::move(J), omegas, base);
+      return std::make_unique<LinearPart>(J, omegas, base);
     }
   }
 

@@ -169,7 +169,8 @@ Vector3d Followers::keep_momentum(double t, VectorXd& y) {
   // The least (added / rate)^2 + (turned / angle)^2 for which J added + turned x H = lost.
   const Matrix3d W =
       rate * rate * J * J.transpose() + angle * angle * (H.squaredNorm() * Matrix3d::Identity() - H * H.transpose());
-  const Vector3d pull = W.ldlt().solve(lost), added = A.transpose() * (rate * rate * J.transpose() * pull);
+  const Vector3d pull = W.ldlt().solve(lost);
+  Vector3d added = A.transpose() * (rate * rate * J.transpose() * pull);
   y.segment<3>(root.omega) += added;
   attitude = quaternion_product(attitude, quaternion_of(A.transpose() * (angle * angle * H.cross(pull))));
   return added;

@@ -40,7 +40,7 @@ void sum_of_products(Index m, const double* b, const double* z0, const double* M
 
 }  // namespace
 
-LinearPart::LinearPart(MatrixXd L_of_x, std::vector<int> omegas_in_x, VectorXd base_state)
+LinearPart::LinearPart(const MatrixXd& L_of_x, std::vector<int> omegas_in_x, VectorXd base_state)
     : LinearPart(spectrum_of(L_of_x), L_of_x, std::move(omegas_in_x), std::move(base_state)) {}
 
 LinearPart::LinearPart(const LinearPart& other, MatrixXd L_of_x, int column)

@@ -23,7 +23,7 @@ using Grid = std::array<GridPoint, collocation::points>;
 struct LinearPart : Spectrum {
   /// Splits L; `omegas`: where angular velocities that attitudes follow are in x; `base`: the state where L was taken.
   /// @throws NumericalError when L has no full set of eigenvectors.
-  LinearPart(Eigen::MatrixXd L, std::vector<int> omegas, Eigen::VectorXd base);
+  LinearPart(const Eigen::MatrixXd& L, std::vector<int> omegas, Eigen::VectorXd base);
 
   /// Of another L that differs in one column, as by a stop. What the difference hardly couples stays as it is (the
   /// remainder takes that), so most eigenvectors of many modes are those of `other`.

@@ -32,21 +32,14 @@ BodyData body_data(const ReducedBody&, Stiffening);
 /// A deformed body (README, "Geometric stiffness in the equations"). Vectors over all shapes but for `slope`.
 template <class T>
 struct DeformedBody {
-  Vec3<T> mc;
-  std::array<T, 6> J;
+  Vec3<T> mc{};
+  std::array<T, 6> J{};
   std::vector<Vec3<T>> Cr;
   std::vector<T> q, q_dot, q_ddot, on_q;
   std::vector<T> slope;  // d q_a / d q_k of what follows, (shapes - n) x n by rows
 
   explicit DeformedBody(const BodyData& b)
-      : mc{},
-        J{},
-        Cr(b.shapes),
-        q(b.shapes),
-        q_dot(b.shapes),
-        q_ddot(b.shapes),
-        on_q(b.shapes),
-        slope((b.shapes - b.n) * b.n) {}
+      : Cr(b.shapes), q(b.shapes), q_dot(b.shapes), q_ddot(b.shapes), on_q(b.shapes), slope((b.shapes - b.n) * b.n) {}
 };
 
 /// Sets mc, J, Cr, q and slope.

@@ -125,7 +125,7 @@ PairMotion<double> Equations::pair(const JointData& j, double t, const double* y
   return x;
 }
 
-RowMultipliers Equations::multipliers(const JointData& j, const double* y) const {
+RowMultipliers Equations::multipliers(const JointData& j, const double* y) {
   RowMultipliers m;
   for (size_t i = 0; i < j.rows.size(); ++i)
     if (j.rows[i].kept) m.lambda[i] = y[j.rows[i].lambda], m.mu[i] = y[j.rows[i].mu];

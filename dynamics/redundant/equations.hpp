@@ -124,7 +124,7 @@ class Equations {
   /// Gradient of all rows over the freedoms, all_rows x freedoms.
   Eigen::MatrixXd gradient(double t, const double* y);
   /// Mass matrix of a body over its freedoms.
-  Eigen::MatrixXd mass(size_t body, const double* y) const;
+  Eigen::MatrixXd mass(size_t i, const double* y) const;
   /// y_dot and the multipliers in y, consistent with the motion in y (mu and nu zero).
   /// @throws NumericalError when the kept rows are not independent.
   void make_consistent(double t, Eigen::VectorXd& y, Eigen::VectorXd& y_dot, const JointMemory&);
@@ -137,7 +137,7 @@ class Equations {
   const Eigen::VectorXd& inverse_metric() const { return inverse_metric_; }
 
   /// Angle or way of a joint less its threshold: keeps its digits near the stop.
-  DriveMotion<double> gap(size_t joint, const double* y, double near) const;
+  DriveMotion<double> gap(size_t i, const double* y, double near) const;
   std::vector<JointReaction> loads(double t, const double* y);
   /// Potential energy of mechanisms, springs, bodies and gravity.
   double potential(const double* y, const JointMemory&) const;
@@ -151,21 +151,20 @@ class Equations {
     double kinetic = 0;                             // [J]
   };
   /// Of a body without its wheels.
-  Momenta momenta(size_t body, const double* y) const;
+  Momenta momenta(size_t i, const double* y) const;
 
  private:
   Frame<double> frame(int body, const double* y) const;
   Elastic<double> elastic(const PlaceData&, const double* y) const;
   void scatter(const PlaceData&, const PlaceForce<double>&, const double* y, double* F) const;
   void scatter_correction(const PlaceData&, const PlaceForce<double>&, const double* y, double* F) const;
-  RowMultipliers multipliers(const JointData&, const double* y) const;
+  static RowMultipliers multipliers(const JointData&, const double* y);
   void body_residual(size_t i, const double* y, const double* y_dot, double* F);
   /// Adds the field's gravity on body i to its rows; its power [W]. The Newton matrix leaves out its derivatives, which
   /// are of the size of the orbital rate squared.
   double pull_by_field(size_t i, double t, const double* y, double* F) const;
   void body_newton(size_t i, double t, double c, const double* y, const double* y_dot, PatternSum&);
-  void pair_newton(const JointData&, const Eigen::MatrixXd& derivatives, bool velocities, int loss, const double* y,
-                   PatternSum&);
+  void pair_newton(const JointData&, const Eigen::MatrixXd& L, bool velocities, int loss, const double* y, PatternSum&);
 
   const Prepared& prepared_;
   const Multibody& scene_;

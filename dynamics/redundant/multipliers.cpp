@@ -242,7 +242,7 @@ std::vector<BodyState> place_bodies(const Multibody& scene, const std::vector<st
   return states;
 }
 
-std::vector<BodyState> close_joints(const Multipliers& system, std::vector<BodyState> states, double t) {
+std::vector<BodyState> close_joints(const Multipliers& system, const std::vector<BodyState>& states, double t) {
   Equations e(system.impl());
   require(states.size() == system.multibody().bodies.size(), "one state per body is needed");
   VectorXd y = e.pack(states);

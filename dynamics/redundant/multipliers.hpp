@@ -113,7 +113,7 @@ std::vector<BodyState> place_bodies(const Multibody&, const std::vector<std::vec
 
 /// Moves the bodies as little as needed (mass metric) until every joint closes at t [s], positions and velocities.
 /// @throws InputError naming the joint that stays open.
-std::vector<BodyState> close_joints(const Multipliers&, std::vector<BodyState>, double t = 0);
+std::vector<BodyState> close_joints(const Multipliers&, const std::vector<BodyState>&, double t = 0);
 
 /// Flies the bodies from the start with SUNDIALS IDA.
 /// @throws InputError when the start does not fulfil a joint (naming it) or the options are bad; NumericalError when

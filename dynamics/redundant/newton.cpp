@@ -122,7 +122,7 @@ MatrixXd pair_derivatives(const JointData& j, const PairMotion<double>& x, bool 
       for (int c = 0; c < 3; ++c) directions.push_back({b, group, c});
     }
   }
-  const Index m = static_cast<Index>(j.rows.size());
+  const auto m = static_cast<Index>(j.rows.size());
   MatrixXd L = MatrixXd::Zero(26 + 2 * m, 2 * side_size + 1);
   const PairMotion<Lanes> base = lifted_pair(x);
   for (size_t first = 0; first < directions.size(); first += 8) {
@@ -147,7 +147,7 @@ MatrixXd pair_derivatives(const JointData& j, const PairMotion<double>& x, bool 
     Index row = 0;
     for (PlaceForce<Lanes>* f : {&r.forces.a, &r.forces.b})
       for (Vec3<Lanes>* v : {&f->R, &f->w, &f->s, &f->phi})
-        for (int c = 0; c < 3; ++c) L(row++, 2 * side_size) = component(*v, c).v;
+        for (int c = 0; c < 3; ++c) L(row++, Index{2} * side_size) = component(*v, c).v;
   }
   for (const Index group : {0, 12}) L.middleCols(group, 3) = -L.middleCols(side_size + group, 3);
   if (!velocities)  // d g_dot / d velocity = dg / d position
@@ -274,7 +274,7 @@ void Equations::body_newton(size_t i, double t, double c, const double* y, const
 
 void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velocities, int loss, const double* y,
                             PatternSum& out) {
-  const Index m = static_cast<Index>(j.rows.size());
+  const auto m = static_cast<Index>(j.rows.size());
   const std::array<const PlaceData*, 2> sides = {&j.a, &j.b};
   for (size_t side = 0; side < 2; ++side) {
     const PlaceData& p = *sides[side];
@@ -288,7 +288,7 @@ void Equations::pair_newton(const JointData& j, const MatrixXd& L, bool velociti
       for (const Entry& e : *slope) {  // the shapes change: rates S(q) q_dot, and forces on q
         const auto c = static_cast<Index>(e.component), k = static_cast<Index>(e.k), l = static_cast<Index>(e.l);
         of_positions.col(7 + l) += L.col(first + 12 + group + c) * (e.value * y[at.u + k]);
-        const double force = L(12 * static_cast<Index>(side) + group + c, 2 * side_size);
+        const double force = L(12 * static_cast<Index>(side) + group + c, Index{2} * side_size);
         out.add(at.u + static_cast<int>(k), at.q + static_cast<int>(l), -e.value * force);
       }
     for (size_t other = 0; other < 2; ++other) {
@@ -385,7 +385,7 @@ MatrixXd Equations::gradient(double t, const double* y) {
   Index first = 0;
   for (size_t i = 0; i < joints_.size(); ++i) {
     const JointData& j = joints_[i];
-    const Index m = static_cast<Index>(j.rows.size());
+    const auto m = static_cast<Index>(j.rows.size());
     if (m == 0) continue;
     const MatrixXd L = pair_derivatives(j, pair(j, t, y, &scene_.joints[i]), false, [&](const PairMotion<Lanes>& x) {
       PairResult r;

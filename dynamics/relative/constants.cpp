@@ -111,7 +111,8 @@ std::vector<int> order_of(const Multibody& scene, const std::vector<int>& carrie
                           scene.bodies[static_cast<size_t>(i)].name));
       path.push_back(b);
     }
-    for (auto b = path.rbegin(); b != path.rend(); ++b) order.push_back(*b), placed[static_cast<size_t>(*b)] = 1;
+    std::ranges::reverse(path);
+    for (const int b : path) order.push_back(b), placed[static_cast<size_t>(b)] = 1;
   }
   return order;
 }

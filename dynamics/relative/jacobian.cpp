@@ -11,10 +11,11 @@ void Tree::jacobian_columns(double t, const double* y, std::span<const char> con
   for (int i = 0; i < impl_->layout.size; ++i) w.in[static_cast<size_t>(i)] = y[i];
   for (int done = 0; done < columns.cols(); done += TreeWorkspace::lanes) {
     const int count = std::min(TreeWorkspace::lanes, static_cast<int>(columns.cols()) - done);
-    for (int i = 0; i < count; ++i) w.in[static_cast<size_t>(first + done + i)].d[i] = 1;
+    const size_t at = static_cast<size_t>(first) + static_cast<size_t>(done);
+    for (int i = 0; i < count; ++i) w.in[at + static_cast<size_t>(i)].d[i] = 1;
     tree::derivative(impl_->model, w.in.data(), w.instant, contact, w.dual, w.out.data());
     for (int i = 0; i < count; ++i) {
-      w.in[static_cast<size_t>(first + done + i)].d[i] = 0;
+      w.in[at + static_cast<size_t>(i)].d[i] = 0;
       for (int r = 0; r < columns.rows(); ++r) columns(r, done + i) = w.out[static_cast<size_t>(r)].d[i];
     }
   }

@@ -60,7 +60,7 @@ struct RotationFunctions {
     }();
     T sum(0.0);
     for (int m = 9; m >= (slope ? 1 : 0); --m) {
-      const double c = (m % 2 ? -1.0 : 1.0) / factorial[static_cast<size_t>(2 * m + first)];
+      const double c = (m % 2 ? -1.0 : 1.0) / factorial[2 * static_cast<size_t>(m) + static_cast<size_t>(first)];
       sum = T(slope ? m * c : c) + s * sum;
     }
     return sum;

@@ -59,6 +59,7 @@ equations::Rows<Quad> rows(const Members& bodies, equations::Rows<double> Body::
         set_lane(values[{row.k, of_body.l[i], row.component}], lane, of_body.value[i]);
   }
   std::vector<TermOf<Quad>> terms;
+  terms.reserve(values.size());
   for (const auto& [key, value] : values)
     terms.push_back({std::get<0>(key), std::get<1>(key), std::get<2>(key), value});
   return equations::Rows<Quad>(std::move(terms));

@@ -142,8 +142,8 @@ class Tree {
 
   /// Of a state with what is prescribed at t as prescribed; the second form imposes that.
   Balance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y, TreeWorkspace&) const;
-  Balance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y) const;
-  PlaceMotionInSpace motion(double t, const Eigen::Ref<const Eigen::VectorXd>& y, const Place&) const;
+  Balance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& state) const;
+  PlaceMotionInSpace motion(double t, const Eigen::Ref<const Eigen::VectorXd>& state, const Place&) const;
   std::vector<JointLoad> joint_loads(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
                                      std::span<const char> contact, std::span<const LawBranch> laws = {}) const;
 

@@ -80,8 +80,8 @@ Vector3d displacement(const BodyAxes& body, const SmoothShape& shape, const Vect
 
 MatrixXd smooth_shapes(const Mesh& mesh, const DofMap& dofs) {
   const BodyAxes body(mesh.nodes);
-  if (!body.slender) return MatrixXd(dofs.count, 0);
-  MatrixXd result = MatrixXd::Zero(dofs.count, shapes.size());
+  MatrixXd result = MatrixXd::Zero(dofs.count, body.slender ? std::ssize(shapes) : 0);
+  if (!body.slender) return result;
   for (int node = 0; node < mesh.nodes.cols(); ++node) {
     if (dofs.freedoms_of(node) < 3) continue;
     const Vector3d r = mesh.nodes.col(node) - body.centre;

@@ -151,6 +151,7 @@ Surface surface_of(const Mesh& mesh) {
     }
   }
   std::vector<std::pair<int, size_t>> outside;
+  outside.reserve(open.size());
   for (const auto& [corners, place] : open) outside.push_back(place);
   std::ranges::sort(outside);
   Surface surface;

@@ -33,7 +33,7 @@ MatrixXd well_apart(const MatrixXd& G, double cut) {
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(D.asDiagonal() * G * D.asDiagonal());
   const VectorXd& w = eigen.eigenvalues();
   const Index kept = (w.array() > independent * w(w.size() - 1)).count();
-  if (!(w(w.size() - 1) > 0)) return MatrixXd(G.rows(), 0);
+  if (!(w(w.size() - 1) > 0)) return MatrixXd::Zero(G.rows(), 0);
   return D.asDiagonal() * eigen.eigenvectors().rightCols(kept) * w.tail(kept).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 

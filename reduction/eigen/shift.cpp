@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace flexboom {
 namespace {
@@ -32,7 +33,7 @@ double absolute_form(const SparseMatrix& A, const VectorXd& x) {
 
 }  // namespace
 
-ShiftedFactor::ShiftedFactor(const EigenProblem& problem) : problem_(problem) {}
+ShiftedFactor::ShiftedFactor(EigenProblem problem) : problem_(std::move(problem)) {}
 
 void ShiftedFactor::analyse(const SparseMatrix& pattern) {
   const bool small = pattern.rows() <= indefinite_unknowns;

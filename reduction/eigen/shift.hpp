@@ -10,7 +10,7 @@ namespace flexboom {
 /// no copy is made.
 class ShiftedFactor {
  public:
-  explicit ShiftedFactor(const EigenProblem&);
+  explicit ShiftedFactor(EigenProblem);
 
   /// Factorises K - sigma M, unless that is the factor in place.
   /// @throws NumericalError when K - sigma M is not positive definite: sigma lies above eigenvalues or on one.

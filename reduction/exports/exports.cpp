@@ -173,7 +173,7 @@ double number_setting(std::span<const ExportSetting> settings, const ExportOptio
 }
 
 std::string export_name(const std::filesystem::path& path) {
-  const std::string name = (path.has_filename() ? path : path.parent_path()).stem().string();
+  std::string name = (path.has_filename() ? path : path.parent_path()).stem().string();
   require(!name.empty() && name != "." && name != "..",
           fmt::format("export to \"{}\": give a file or folder with a name", path.string()));
   return name;

@@ -222,7 +222,7 @@ std::string block_text(const File42& file, const std::string& name) {
 }
 
 std::string name_in_files(const std::filesystem::path& folder) {
-  const std::string name = plain_name(export_name(folder));
+  std::string name = plain_name(export_name(folder));
   require(name.size() <= longest_name,
           fmt::format("export to \"{}\": 42 takes file names of 39 characters, so this name "
                       "must have {} or less",
