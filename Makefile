@@ -7,7 +7,7 @@ FUZZ_SECONDS ?= 600
 
 packages := g++ cmake ninja-build \
   libeigen3-dev libsuitesparse-dev libmetis-dev libopenblas-dev liblapacke-dev libmumps-seq-dev libarpack2-dev libspectra-dev libsundials-dev libmuparser-dev \
-  libcli11-dev libtomlplusplus-dev libpugixml-dev zlib1g-dev libssl-dev libhdf5-dev libmatio-dev nlohmann-json3-dev libfmt-dev \
+  libcli11-dev libtomlplusplus-dev libpugixml-dev zlib1g-dev libssl-dev libhdf5-dev libmatio-dev libsqlite3-dev nlohmann-json3-dev libfmt-dev \
   libgtest-dev libbenchmark-dev \
   python3 python3-numpy python3-scipy python3-meshio python3-vtk9 python3-h5py
 format tidy: packages += clang-format clang-tidy

@@ -35,6 +35,7 @@ struct CommandLine {
   std::filesystem::path inspected;
   BenchArguments bench;
   CompareArguments compare;
+  SweepArguments sweep;
   std::string checked;
   std::string keys_of;
   std::filesystem::path reported;
@@ -52,6 +53,7 @@ struct CommandLine {
     add_export();
     add_bench();
     add_compare();
+    add_sweep();
     add_report();
   }
 
@@ -152,6 +154,42 @@ struct CommandLine {
     c->add_option("--loads-at", reduce.loads_at, "Node sets where loads stiffen the body; all that move by default");
     add_model_options(c, reduce.options);
     c->callback([this] { action = [this] { return reduce_command(reduce, common); }; });
+  }
+
+  void add_sweep() {
+    CLI::App* c = command("sweep", "scene -> many runs with varied keys -> one table");
+    c->footer(
+        "SPEC is a,b,c (numbers or words), lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, normal:MEAN:STANDARD_DEVIATION "
+        "or uniform:LOWEST:HIGHEST. Where runs are drawn, each entry of a list is as likely.");
+    c->add_option("SCENE", sweep.scene, "Scene file, or the name of a built-in scene (sport, tumbling, ...)");
+    c->add_option(
+         "--vary", sweep.vary,
+         "KEY=SPEC (repeatable). KEY is a path such as hub.mass, hinges.NAME.P2, bodies.NAME.segments[0].length "
+         "or hinges[*].P2. KEY1,KEY2=SPEC gives both one value; KEY1,KEY2*=SPEC multiplies each by one factor")
+        ->allow_extra_args(false);
+    c->add_option("-n,--runs", sweep.runs, "Number of runs to draw; of --indices, base points");
+    c->add_option(
+        "--sample", sweep.sample,
+        "grid: every combination of lists (default where all are lists); random (default otherwise); lhs: Latin "
+        "hypercube; sobol: points of Joe and Kuo, shifted by the seed, best with n a power of 2");
+    c->add_option("--seed", sweep.seed, "Of the draws; 1 by default");
+    c->add_flag("--indices", sweep.indices,
+                "Sobol indices: how much of each quantity's variance each key makes. Needs --sample sobol and n*(d+2) "
+                "runs for d keys that take more than one value");
+    c->add_option(
+         "--quantity", sweep.quantities,
+         "COLUMN:max (of its size), COLUMN:rms, COLUMN:final or settle:COLUMN:FRACTION (repeatable). COLUMN is "
+         "one of trajectory.csv, or a vector such as hub.rotation. Default: max and rms of attitudes, hinge "
+         "angles and tips")
+        ->allow_extra_args(false);
+    c->add_flag("--loads", sweep.loads, "Force and torque of every joint as outputs; their peaks are quantities");
+    c->add_flag("--trajectories", sweep.trajectories, "Keep every trajectory in sweep.h5");
+    c->add_option("--jobs", sweep.jobs, "Processes (default: one per core)")->check(CLI::Range(1, 1024));
+    c->add_flag("--resume", sweep.resume, "Go on where the journal in the output folder ends");
+    c->add_option("--shard", sweep.shard, "i/n: the i-th of n parts of the runs, i from 1 to n");
+    c->add_option("--merge", sweep.merge, "Folders of all shards; writes one table into --out");
+    c->add_flag("--report", sweep.report, "Write report.html too");
+    c->callback([this] { action = [this] { return sweep_command(sweep, common); }; });
   }
 
   void add_inspect() {

@@ -50,7 +50,8 @@ ROOMS = {
         "simulate": ["base", "scene", "model"],
         "results": ["base", "scene", "model", "simulate"],
         "bench": ["simulate"],
-        "commands": ["base", "scene", "model", "simulate", "results", "bench"],
+        "sweep": ["base", "scene", "model", "simulate", "results"],
+        "commands": ["base", "scene", "model", "simulate", "results", "bench", "sweep"],
         ".": ["base", "commands"],
     },
 }

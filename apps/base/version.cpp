@@ -5,6 +5,7 @@
 #include <Spectra/Util/Version.h>
 #include <fmt/format.h>
 #include <openssl/opensslv.h>
+#include <sqlite3.h>
 #include <sundials/sundials_config.h>
 #include <toml++/impl/version.h>
 #include <CLI/Version.hpp>
@@ -40,6 +41,7 @@ std::string version_text() {
   line("Spectra", fmt::format("{}.{}.{}", SPECTRA_MAJOR_VERSION, SPECTRA_MINOR_VERSION, SPECTRA_PATCH_VERSION),
        "MPL-2.0");
   line("muParser", "", "BSD-2-Clause");
+  line("SQLite", sqlite3_libversion(), "public domain");
   line("SUNDIALS", SUNDIALS_VERSION, "BSD-3-Clause");
   line("CLI11", CLI11_VERSION, "BSD-3-Clause");
   line("toml++", fmt::format("{}.{}.{}", TOML_LIB_MAJOR, TOML_LIB_MINOR, TOML_LIB_PATCH), "MIT");

@@ -3,6 +3,8 @@
 #include "apps/model/model.hpp"
 #include "apps/model/reduction.hpp"
 
+#include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -84,6 +86,20 @@ struct CompareArguments {
   bool no_transient = false;
 };
 
+struct SweepArguments {
+  std::string scene;
+  std::vector<std::string> vary, quantities;
+  std::optional<size_t> runs;
+  std::string sample;  // empty: grid where all are lists, else random
+  std::uint64_t seed = 1;
+  bool indices = false;  // sample for Sobol indices
+  size_t jobs = 0;       // 0: all cores
+  bool resume = false;
+  std::string shard;  // "i/n"; empty: all runs
+  bool trajectories = false, loads = false, report = false;
+  std::vector<std::filesystem::path> merge;
+};
+
 // One function per command; each returns its exit code and throws InputError or NumericalError.
 int run_command(const RunArguments&, const CommonOptions&);
 int check_command(const std::string& name, const CommonOptions&);
@@ -97,6 +113,7 @@ int bench_modes_command(const BenchArguments&, const CommonOptions&);
 int bench_reduction_command(const BenchArguments&, const CommonOptions&);
 int bench_transient_command(const BenchArguments&, const CommonOptions&);
 int compare_command(const CompareArguments&, const CommonOptions&);
+int sweep_command(const SweepArguments&, const CommonOptions&);
 int report_command(const std::filesystem::path& folder, const CommonOptions&);
 
 }  // namespace flexboom

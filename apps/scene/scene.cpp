@@ -149,8 +149,7 @@ double OrbitScene::rate() const {
 
 namespace {
 
-Scene parse_scene(const std::string& text, const std::string& file_name, Reading& reading) {
-  const Value root = parse_format(text, file_name, scene_keys::scene_format);
+Scene scene_of_table(const Value& root, Reading& reading) {
   TableReader table(root, "", reading.faults);
   read_format(table, scene_keys::scene_format);
   const bool has_hub = table.has("hub") || table.has("hinges");
@@ -179,7 +178,13 @@ Scene parse_scene(const std::string& text, const std::string& file_name, Reading
 Scene parse_scene(const std::string& text, const std::string& file_name, const std::filesystem::path& folder) {
   Reading reading;
   reading.folder = folder;
-  return parse_scene(text, file_name, reading);
+  return scene_of_table(parse_format(text, file_name, scene_keys::scene_format), reading);
+}
+
+Scene read_scene(const Value& root, const std::filesystem::path& folder) {
+  Reading reading;
+  reading.folder = folder;
+  return scene_of_table(root, reading);
 }
 
 std::set<std::string> keys_known(const std::string& scene, const std::filesystem::path& folder) {
@@ -187,7 +192,7 @@ std::set<std::string> keys_known(const std::string& scene, const std::filesystem
   Reading reading;
   reading.folder = folder;
   reading.faults.note_keys(keys);
-  parse_scene(scene, "scene", reading);
+  scene_of_table(parse_format(scene, "scene", scene_keys::scene_format), reading);
   return keys;
 }
 

@@ -18,6 +18,10 @@ namespace flexboom {
 
 class SavedState;
 
+namespace toml_reader {
+struct Value;
+}
+
 /// A rigid body of a scene with joints.
 struct RigidScene {
   double mass = 0;                                    // [kg]
@@ -126,6 +130,8 @@ struct Scene {
 /// @throws InputError with every fault found, one per line.
 Scene read_scene(const std::filesystem::path&);
 Scene parse_scene(const std::string& text, const std::string& file_name, const std::filesystem::path& folder = ".");
+/// Of a scene file that was parsed and perhaps changed since; `folder`: that its body files are relative to.
+Scene read_scene(const toml_reader::Value& root, const std::filesystem::path& folder);
 BodyScene read_body(const std::filesystem::path&);
 
 /// A path, or the name of a built-in scene ("sport"). @throws InputError listing the built-in names.

@@ -10,6 +10,9 @@
 
 #include <algorithm>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
 namespace flexboom {
 
@@ -18,25 +21,41 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// Puts values under their names, row by row: the first row says what the columns are.
+/// Puts values under their names, row by row: the first row says what the columns are. A name has an owner and what it
+/// is of it, so that no text is made for the rows behind the first.
 class Columns {
  public:
   Columns(OutputTable& table, Eigen::Index rows) : table_(table), rows_(rows) {}
 
-  void put(const std::string& name, double value) {
+  void put(std::string_view owner, std::string_view what, double value) { put_part(owner, what, "", value); }
+  void put(std::string_view owner, std::string_view what, const Vector3d& v) {
+    put_part(owner, what, ".x", v.x()), put_part(owner, what, ".y", v.y()), put_part(owner, what, ".z", v.z());
+  }
+  /// The elements of a vector, counted from 1.
+  void put_numbered(std::string_view owner, std::string_view what, const Eigen::Ref<const VectorXd>& v) {
+    for (Eigen::Index i = 0; i < v.size(); ++i)
+      put_part(owner, what, row_ == 0 ? std::to_string(i + 1) : std::string(), v[i]);
+  }
+  void end_row() {
     if (row_ == 0) {
-      table_.names.push_back(name);
-      table_.values.conservativeResize(rows_, static_cast<Eigen::Index>(table_.names.size()));
+      table_.values.resize(rows_, std::ssize(first_));
+      table_.values.row(0) = Eigen::Map<const Eigen::RowVectorXd>(first_.data(), std::ssize(first_));
     }
-    table_.values(row_, column_++) = value;
+    ++row_, column_ = 0;
   }
-  void put(const std::string& name, const Vector3d& v) {
-    put(name + ".x", v.x()), put(name + ".y", v.y()), put(name + ".z", v.z());
-  }
-  void end_row() { ++row_, column_ = 0; }
 
  private:
+  void put_part(std::string_view owner, std::string_view what, std::string_view part, double value) {
+    if (row_ > 0) {
+      table_.values(row_, column_++) = value;
+      return;
+    }
+    table_.names.push_back(fmt::format("{}{}{}", owner, what, part));
+    first_.push_back(value);
+  }
+
   OutputTable& table_;
+  std::vector<double> first_;  // row
   Eigen::Index rows_, row_ = 0, column_ = 0;
 };
 
@@ -47,34 +66,35 @@ void put_joint(Columns& out, const JointScene& joint, const JointState& s, const
     case JointKind::fixed:
       return;
     case JointKind::hinge:
-      return out.put(name + ".angle", s.coordinate[0]), out.put(name + ".rate", s.rate[0]);
+      return out.put(name, ".angle", s.coordinate[0]), out.put(name, ".rate", s.rate[0]);
     case JointKind::slider:
-      return out.put(name + ".length", s.coordinate[0]), out.put(name + ".rate", s.rate[0]);
+      return out.put(name, ".length", s.coordinate[0]), out.put(name, ".rate", s.rate[0]);
     case JointKind::universal:
-      out.put(name + ".angle1", s.coordinate[0]), out.put(name + ".angle2", s.coordinate[1]);
-      return out.put(name + ".rate1", s.rate[0]), out.put(name + ".rate2", s.rate[1]);
+      out.put(name, ".angle1", s.coordinate[0]), out.put(name, ".angle2", s.coordinate[1]);
+      return out.put(name, ".rate1", s.rate[0]), out.put(name, ".rate2", s.rate[1]);
     case JointKind::spherical:
     case JointKind::free:
-      out.put(name + ".rotation", rotation_vector(s.attitude)), out.put(name + ".rate", s.omega);
+      out.put(name, ".rotation", rotation_vector(s.attitude)), out.put(name, ".rate", s.omega);
   }
   if (joint.kind != JointKind::free) return;
   Vector3d position = s.position;
   if (joint.a.body.empty()) position += joint.a.axes().transpose() * centre;
-  out.put(name + ".position", position), out.put(name + ".velocity", s.velocity);
+  out.put(name, ".position", position), out.put(name, ".velocity", s.velocity);
 }
 
-void put_body(Columns& out, const Tree& tree, size_t number, const VectorXd& q) {
+/// `tip`: nullptr where the body has none.
+void put_body(Columns& out, const Tree& tree, size_t number, const Marker* tip, const VectorXd& q) {
   const ReducedBody& body = tree.scene().bodies[number];
-  for (Eigen::Index k = 0; k < q.size(); ++k) out.put(fmt::format("{}.q{}", body.name, k + 1), q[k]);
-  if (const Marker* tip = body.n() > 0 ? tip_of(body) : nullptr)
-    out.put(body.name + ".tip", displacement(body, *tip, q, tree.stiffening(static_cast<int>(number))));
+  out.put_numbered(body.name, ".q", q);
+  if (tip != nullptr)
+    out.put(body.name, ".tip", displacement(body, *tip, q, tree.stiffening(static_cast<int>(number))));
 }
 
 void put_load(Columns& out, const JointScene& joint, const JointLoad& load) {
-  out.put(joint.name + ".force", load.force), out.put(joint.name + ".torque", load.torque);
-  if (load.drive.size() == 1) out.put(joint.name + ".drive", load.drive[0]);
-  for (size_t i = 1; load.drive.size() > 1 && i <= load.drive.size(); ++i)
-    out.put(fmt::format("{}.drive{}", joint.name, i), load.drive[i - 1]);
+  out.put(joint.name, ".force", load.force), out.put(joint.name, ".torque", load.torque);
+  if (load.drive.size() == 1) out.put(joint.name, ".drive", load.drive[0]);
+  if (load.drive.size() > 1)
+    out.put_numbered(joint.name, ".drive", Eigen::Map<const VectorXd>(load.drive.data(), std::ssize(load.drive)));
 }
 
 /// The joint of the body whose attitude against the LVLH frame is an output.
@@ -107,7 +127,7 @@ class Pointing {
     const Eigen::Matrix3d now = start_.transpose() * rotation_matrix(s.joints[joint_].attitude);
     const Eigen::Quaterniond error(Eigen::Matrix3d(rotation_matrix(commanded_attitude(turns_, t)).transpose() *
                                                    from_place_ * now * from_place_.transpose()));
-    out.put(name_ + ".pointing", rotation_vector({error.w(), error.x(), error.y(), error.z()}));
+    out.put(name_, ".pointing", rotation_vector({error.w(), error.x(), error.y(), error.z()}));
   }
 
  private:
@@ -126,28 +146,30 @@ OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
   const Pointing pointing(scene);
   Vector3d centre = Vector3d::Zero();
   if (tree.scene().field) centre = mass_centre(tree, start_state(without_loops(scene), tree));
+  std::vector<const Marker*> tips;
+  for (const ReducedBody& body : tree.scene().bodies) tips.push_back(body.n() > 0 ? tip_of(body) : nullptr);
   const size_t flying = first_that_flies(scene);
   std::optional<Orbit> orbit;
   if (scene.orbit && flying < scene.joints.size()) orbit = orbit_of(scene);
   for (size_t row = 0; row < rows; ++row) {
     const Moment now = moment(row);
     const TreeState& s = now.state;
-    out.put("t", now.time);
+    out.put("t", "", now.time);
     for (size_t i = 0; i < scene.joints.size(); ++i) {
       put_joint(out, scene.joints[i], s.joints[i], centre);
       if (scene.joints[i].loads) put_load(out, scene.joints[i], now.loads[i]);
     }
-    for (size_t b = 0; b < scene.bodies.size(); ++b) put_body(out, tree, b, s.q[b]);
-    for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name + ".spin", s.spin[w]);
+    for (size_t b = 0; b < scene.bodies.size(); ++b) put_body(out, tree, b, tips[b], s.q[b]);
+    for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name, ".spin", s.spin[w]);
     pointing.put(out, now.time, s);
     if (orbit) {
       const Vector3d angles = lvlh_angles(attitude_of(scene.joints[flying], s.joints[flying]), *orbit, now.time);
-      out.put("lvlh.roll", angles.x()), out.put("lvlh.pitch", angles.y()), out.put("lvlh.yaw", angles.z());
+      out.put("lvlh", ".roll", angles.x()), out.put("lvlh", ".pitch", angles.y()), out.put("lvlh", ".yaw", angles.z());
     }
     const Balance& e = now.balance;
-    out.put("energy.kinetic", e.kinetic), out.put("energy.elastic", e.elastic);
-    out.put("energy.potential", e.potential), out.put("energy.dissipated", e.dissipated);
-    out.put("energy.work", e.work);
+    out.put("energy", ".kinetic", e.kinetic), out.put("energy", ".elastic", e.elastic);
+    out.put("energy", ".potential", e.potential), out.put("energy", ".dissipated", e.dissipated);
+    out.put("energy", ".work", e.work);
     out.end_row();
   }
   return table;

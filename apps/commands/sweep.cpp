@@ -1,0 +1,134 @@
+#include "apps/sweep/sweep.hpp"
+#include "apps/commands/commands.hpp"
+#include "fem/base/check.hpp"
+
+#include <fmt/format.h>
+#include <sched.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstdio>
+
+namespace flexboom {
+
+namespace {
+
+/// Cores that this process may use.
+size_t cores() {
+  cpu_set_t allowed;
+  CPU_ZERO(&allowed);
+  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) return 1;
+  return static_cast<size_t>(std::max(1, CPU_COUNT(&allowed)));
+}
+
+Shard shard_of(const std::string& text) {
+  Shard shard;
+  if (text.empty()) return shard;
+  const char* const last = text.data() + text.size();
+  const auto first_read = std::from_chars(text.data(), last, shard.part);
+  const bool has_slash = first_read.ec == std::errc() && first_read.ptr != last && *first_read.ptr == '/';
+  const auto second_read = std::from_chars(has_slash ? first_read.ptr + 1 : last, last, shard.of);
+  require(has_slash && second_read.ec == std::errc() && second_read.ptr == last && shard.part >= 1 &&
+              shard.part <= shard.of,
+          fmt::format("--shard {}: is written i/n, i from 1 to n", text));
+  return shard;
+}
+
+/// Runs done and time left, on a terminal, for work over a second.
+class SweepProgressLine {
+ public:
+  explicit SweepProgressLine(bool wanted) : wanted_(wanted && isatty(STDERR_FILENO) == 1) {}
+  ~SweepProgressLine() {
+    if (shown_) std::fputs(fmt::format("\r{:79}\r", "").c_str(), stderr);
+  }
+  SweepProgressLine(const SweepProgressLine&) = delete;
+  SweepProgressLine& operator=(const SweepProgressLine&) = delete;
+
+  void operator()(size_t done, size_t of) {
+    if (!wanted_) return;
+    const auto now = std::chrono::steady_clock::now();
+    if (told_++ == 0) before_ = done - 1;
+    const double wall = std::chrono::duration<double>(now - start_).count();
+    if (wall < 1 || now - last_ < std::chrono::milliseconds(200)) return;
+    last_ = now;
+    shown_ = true;
+    const double rate = static_cast<double>(done - before_) / wall;
+    std::fputs(fmt::format("\r{:79}", fmt::format("{:.0f} %  {} of {} runs, {:.3g} runs/s, {:.0f} s left",
+                                                  100.0 * static_cast<double>(done) / static_cast<double>(of), done, of,
+                                                  rate, static_cast<double>(of - done) / rate))
+                   .c_str(),
+               stderr);
+    std::fflush(stderr);
+  }
+
+ private:
+  bool wanted_, shown_ = false;
+  size_t told_ = 0, before_ = 0;  // done by an earlier process
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_ = start_;
+};
+
+SweepRequest request_of(const SweepArguments& a, const CommonOptions& common) {
+  require(!a.scene.empty(), "sweep needs a SCENE, or --merge DIR...");
+  SweepRequest r;
+  r.scene = a.scene;
+  r.design = {a.vary, a.runs, a.sample, a.seed, a.indices};
+  r.quantities = a.quantities, r.loads = a.loads, r.trajectories = a.trajectories;
+  r.shard = shard_of(a.shard);
+  r.jobs = a.jobs > 0 ? a.jobs : cores();
+  r.resume = a.resume, r.report = a.report;
+  r.out = common.out.empty() ? default_sweep_folder(r) : common.out;
+  return r;
+}
+
+std::string short_number(const nlohmann::ordered_json& v) {
+  return v.is_null() ? "none" : fmt::format("{:.6g}", v.get<double>());
+}
+
+void print_sweep(const SweepEnd& end, const std::filesystem::path& folder) {
+  const nlohmann::ordered_json& s = end.summary;
+  fmt::print("{:<32} {:>12} {:>12} {:>12} {:>12}\n", "quantity", "mean", "1 %", "50 %", "99 %");
+  for (const auto& [name, q] : s["quantities"].items())
+    fmt::print("{:<32} {:>12} {:>12} {:>12} {:>12}\n", name, short_number(q["mean"]),
+               short_number(q["quantiles"]["0.01"]), short_number(q["quantiles"]["0.5"]),
+               short_number(q["quantiles"]["0.99"]));
+  fmt::print("\n{} of {} runs, {} failed, in {:.1f} s\nresults: {}\n", s["runs"]["done"].dump(),
+             s["runs"]["planned"].dump(), end.failed, s["seconds"].get<double>(), folder.string());
+}
+
+SweepEnd swept(const SweepRequest& r, bool progress_wanted) {
+  SweepProgressLine progress(progress_wanted);
+  return run_sweep(r, [&progress](size_t done, size_t of) { progress(done, of); });
+}
+
+}  // namespace
+
+int sweep_command(const SweepArguments& a, const CommonOptions& common) {
+  SweepEnd end;
+  std::filesystem::path folder = common.out;
+  if (!a.merge.empty()) {
+    require(!folder.empty(), "--merge needs --out DIR");
+    require(a.scene.empty() && a.vary.empty(), "--merge takes folders of shards, no SCENE and no --vary");
+    end = merge_sweeps(a.merge, folder, a.report);
+  } else {
+    const SweepRequest request = request_of(a, common);
+    folder = request.out;
+    end = swept(request, !common.quiet && !common.json);
+  }
+  if (common.json) {
+    fmt::print("{}\n", end.summary.dump(2));
+  } else if (!common.quiet) {
+    print_sweep(end, folder);
+  }
+  if (end.interrupted) {
+    if (!common.quiet) print_note(fmt::format("interrupted; --resume goes on in {}", folder.string()));
+    return exit_interrupted;
+  }
+  if (end.failed == 0) return exit_ok;
+  print_note(fmt::format("error: {} of {} runs failed; their messages are in {}", end.failed,
+                         end.summary["runs"]["done"].dump(), (folder / "sweep.csv").string()));
+  return exit_numerical;
+}
+
+}  // namespace flexboom

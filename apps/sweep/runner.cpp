@@ -1,0 +1,113 @@
+#include "apps/sweep/runner.hpp"
+
+#include "apps/simulate/error_budget.hpp"
+#include "apps/simulate/multipliers_flight.hpp"
+#include "apps/simulate/tree_flight.hpp"
+#include "fem/base/check.hpp"
+#include "fem/base/stopwatch.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <utility>
+
+namespace flexboom {
+
+SweepRunner::SweepRunner(SceneSource source, SweepValues values, bool loads, bool keep_trajectories)
+    : source_(std::move(source)),
+      values_(std::move(values)),
+      loads_(loads),
+      keep_trajectories_(keep_trajectories),
+      scene_(source_.read()) {
+  std::vector<std::string> plan;
+  choose_modes(scene_, {}, plan);
+  set_options(scene_);
+  scene_.bodies_kept_in = source_.bodies_kept_in();
+  validate(scene_);
+  for (const BodyScene& b : with_joints(scene_).bodies)
+    if (b.is_boom()) bodies_.emplace(to_toml(b), prepare_body(b, 0, scene_.bodies_kept_in));
+  note_columns(scene_);
+}
+
+void SweepRunner::look_for_columns(size_t runs) {
+  for (size_t run = 0; run < std::min(runs, values_.runs()); ++run) {
+    try {
+      note_columns(scene_of_run(run));
+    } catch (const std::exception&) {  // is reported as a run
+    }
+  }
+}
+
+/// Which columns there are shows in the shortest run.
+void SweepRunner::note_columns(Scene scene) {
+  scene.duration = scene.output_step;
+  for (const std::string& name : simulate(scene).outputs.names)
+    if (std::find(columns_.begin(), columns_.end(), name) == columns_.end()) columns_.push_back(name);
+}
+
+/// What the command line asks of every run, and what was chosen once for all of them.
+void SweepRunner::set_options(Scene& scene) const {
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (std::exchange(scene.bodies[i].modes_auto, false)) scene.bodies[i].modes = scene_.bodies[i].modes;
+  if (!loads_) return;
+  for (HingeScene& h : scene.hinges) h.loads = true;
+  for (JointScene& j : scene.joints) j.loads = j.kind != JointKind::free;
+}
+
+Scene SweepRunner::scene_of_run(size_t run) const {
+  Scene scene = with_values(source_, values_.variations(), values_.of_run(run)).read();
+  set_options(scene);
+  return scene;
+}
+
+PreparedBody SweepRunner::prepared(const BodyScene& b) {
+  if (!b.is_boom()) return prepare_body(b);
+  constexpr size_t most = 200;  // bodies that vary are met once: what they take of the memory must end
+  std::string made_of = to_toml(b);
+  const auto found = bodies_.find(made_of);
+  if (found != bodies_.end()) return found->second;
+  if (bodies_.size() >= most) bodies_.clear();
+  return bodies_.emplace(std::move(made_of), prepare_body(b)).first->second;
+}
+
+Run SweepRunner::simulate(const Scene& given) {
+  const Scene scene = with_joints(given);
+  std::vector<PreparedBody> bodies;
+  for (const BodyScene& b : scene.bodies) bodies.push_back(prepared(b));
+  const auto fly = scene.formulation == "multipliers" ? fly_by_multipliers : fly_tree;
+  return fly(scene, std::move(bodies), {}, 0);
+}
+
+RunOutcome SweepRunner::run(size_t run) {
+  const Stopwatch start;
+  RunOutcome outcome;
+  outcome.run = run;
+  const auto fail = [&](RunStatus status, std::string message) {
+    outcome.status = status, outcome.message = std::move(message);
+  };
+  try {
+    Run flown = simulate(scene_of_run(run));
+    for (const Quantity& q : quantities_) outcome.quantities.push_back(value_of(q, flown.outputs));
+    if (keep_trajectories_) outcome.trajectory = std::move(flown.outputs);
+    const IntegrationSummary& s = flown.motion.summary;
+    if (!is_balanced(s))
+      fail(RunStatus::numerical,
+           fmt::format("energy balance {:.1e}, momentum drift {}: the motion is wrong", s.energy_balance,
+                       std::isnan(s.momentum_drift) ? "not measured" : fmt::format("{:.1e}", s.momentum_drift)));
+  } catch (const InputError& error) {
+    fail(RunStatus::input, error.what());
+  } catch (const NumericalError& error) {
+    fail(RunStatus::numerical, error.what());
+  } catch (const std::exception& error) {
+    fail(RunStatus::crashed, fmt::format("internal error: {}", error.what()));
+  }
+  if (outcome.status != RunStatus::ok) outcome.quantities.clear(), outcome.trajectory.reset();
+  outcome.quantities.resize(quantities_.size(), std::numeric_limits<double>::quiet_NaN());
+  outcome.seconds = start.seconds();
+  return outcome;
+}
+
+}  // namespace flexboom
