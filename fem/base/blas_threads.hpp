@@ -36,7 +36,7 @@ class OneBlasThread {
   OneBlasThread& operator=(const OneBlasThread&) = delete;
 
  private:
-  int threads_;
+  int threads_ = 1;
 };
 
 /// The BLAS in use and its kernels, "OpenBLAS 0.3.21, SkylakeX kernels"; "unknown" for another than OpenBLAS.

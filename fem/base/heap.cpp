@@ -2,8 +2,8 @@
 
 #include <SuiteSparse_config.h>
 
-#include <cstdint>
 #include <cstdlib>
+#include <memory>
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -22,10 +22,10 @@ constexpr std::size_t huge_page = std::size_t{2} << 20;
 void* allocate(std::size_t bytes) {
   void* const block = std::malloc(bytes);
   if (!block || bytes < 32 * huge_page) return block;
-  const auto address = reinterpret_cast<std::uintptr_t>(block);
-  const std::uintptr_t first = (address + huge_page - 1) / huge_page * huge_page;
-  const std::uintptr_t last = (address + bytes) / huge_page * huge_page;
-  madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);  // a wish: where it is refused, small pages do
+  void* first = block;
+  std::size_t left = bytes;
+  if (std::align(huge_page, huge_page, first, left))
+    madvise(first, left / huge_page * huge_page, MADV_HUGEPAGE);  // a wish: where it is refused, small pages do
   return block;
 }
 

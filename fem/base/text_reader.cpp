@@ -106,7 +106,7 @@ long TextReader::integer_of(std::string_view token, std::string_view what) const
 }
 
 size_t TextReader::offset_of(std::string_view at) const {
-  const std::less<const char*> less;
+  const std::less<> less;
   const char *begin = text_.data(), *end = begin + text_.size();
   return at.data() == nullptr || less(at.data(), begin) || less(end, at.data())
              ? text_.size()

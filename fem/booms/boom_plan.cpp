@@ -86,6 +86,7 @@ void count_rings(const BeamGeometry& boom, std::vector<BoomRun>& runs) {
 // Lines of the wide side of a step: those of the narrow side, then evenly to the outline.
 std::vector<double> lines_over(const std::vector<double>& narrow, double ratio, int rings) {
   std::vector<double> lines;
+  lines.reserve(narrow.size());
   for (const double f : narrow) lines.push_back(f * ratio);
   const auto more = rings - static_cast<int>(narrow.size());
   for (int k = 1; k <= more; ++k) lines.push_back(std::lerp(ratio, 1.0, static_cast<double>(k) / more));

@@ -120,7 +120,7 @@ class Builder {
 
   void add_quad(const Corners& q, int layer) {
     const int p = options_.order;
-    const auto n = static_cast<size_t>(p + 1);
+    const size_t n = static_cast<size_t>(p) + 1;
     const int run = layers_[static_cast<size_t>(layer)].run;
     const std::vector<int> bottom = edge(q[0], q[1], run), top = edge(q[3], q[2], run);
     const std::vector<int> left = edge(q[0], q[3], run), right = edge(q[1], q[2], run);

@@ -123,11 +123,12 @@ class Lattice {
     const int sectors = static_cast<int>(turn() - (closed_ ? 0 : 1)) / p;
     for (int sector = 0; sector < sectors; ++sector) {
       LatticeCell cell{{}, plan_.layers[static_cast<size_t>(quad.layer)].segment};
-      cell.nodes.reserve(static_cast<size_t>(n * n * n));
+      cell.nodes.reserve(static_cast<size_t>(n) * static_cast<size_t>(n) * static_cast<size_t>(n));
       for (int k = 0; k < n; ++k) {
         for (int j = 0; j < n; ++j) {
           for (int i = 0; i < n; ++i) {
-            const Index base = quad.nodes[static_cast<size_t>(i + n * k)] * turn();
+            const Index base =
+                quad.nodes[static_cast<size_t>(i) + static_cast<size_t>(n) * static_cast<size_t>(k)] * turn();
             cell.nodes.push_back(static_cast<int>(base + (sector * p + j) % turn()));
           }
         }
@@ -241,6 +242,7 @@ int add_reference(Mesh& mesh, const std::vector<double>& shares, double x, doubl
     return reference;
   }
   std::vector<double> weights;
+  weights.reserve(section.size());
   for (const int i : section) weights.push_back(x > 0 ? shares[static_cast<size_t>(i)] : 1);  // the root is clamped
   mesh.distributing_connections.push_back({reference, std::move(section), std::move(weights), all_components});
   return reference;

@@ -25,11 +25,12 @@ constexpr std::array<std::array<int, 2>, 6> tet_edges = {{{0, 1}, {1, 2}, {2, 0}
 
 // Node of a lattice of order `order` (1 or 2) in the middle of corners a and b (a == b: the corner).
 int middle(const Cell& cell, int order, int a, int b) {
-  std::array<int, 3> at{};
+  std::array<size_t, 3> at{};
   for (size_t d = 0; d < 3; ++d) {
-    at[d] = order * (corners[static_cast<size_t>(a)][d] + corners[static_cast<size_t>(b)][d]) / 2;
+    at[d] = static_cast<size_t>(order * (corners[static_cast<size_t>(a)][d] + corners[static_cast<size_t>(b)][d]) / 2);
   }
-  return cell[static_cast<size_t>(at[0] + (order + 1) * (at[1] + (order + 1) * at[2]))];
+  const size_t n = static_cast<size_t>(order) + 1;
+  return cell[at[0] + n * (at[1] + n * at[2])];
 }
 
 Cells whole(const Cell& cell, int) { return {cell}; }

@@ -70,7 +70,7 @@ size_t walk(const QuotientGraph& graph, const std::vector<int>& roots, Levels& l
 
 /// Undoes a walk; returns its groups from `place` on.
 std::vector<int> take_back(Levels& levels, size_t first, size_t place, int count) {
-  const std::vector<int> tail(levels.order.begin() + static_cast<std::ptrdiff_t>(place), levels.order.end());
+  std::vector<int> tail(levels.order.begin() + static_cast<std::ptrdiff_t>(place), levels.order.end());
   for (size_t k = first; k < levels.order.size(); ++k) levels.level[at(levels.order[k])] = -1;
   levels.order.resize(first);
   levels.count = count;

@@ -61,15 +61,16 @@ struct PackedWork {
 
 /// Second-order strains xx yy zz xy yz zx (engineering shear) of shape k with some shapes from l on, at one point.
 template <class Lanes>
-[[gnu::always_inline]] inline void set_second_order(const double* slopes, int stride, int k, int l, Lanes* strains) {
+[[gnu::always_inline]] inline void set_second_order(const double* slopes, std::ptrdiff_t stride, std::ptrdiff_t k,
+                                                    std::ptrdiff_t l, Lanes* strains) {
   double of_k[9];
   Lanes of_l[9];
 #pragma GCC unroll 9
-  for (int i = 0; i < 9; ++i) {
+  for (std::ptrdiff_t i = 0; i < 9; ++i) {
     of_k[i] = slopes[i * stride + k];
     of_l[i] = lanes_at<Lanes>(slopes + i * stride + l);
   }
-  const auto work = [&](int i, int j) __attribute__((always_inline)) {
+  const auto work = [&](std::ptrdiff_t i, std::ptrdiff_t j) __attribute__((always_inline)) {
     return of_k[3 * i] * of_l[3 * j].of + of_k[3 * i + 1] * of_l[3 * j + 1].of + of_k[3 * i + 2] * of_l[3 * j + 2].of;
   };
   strains[0].of = work(0, 0);
@@ -85,7 +86,7 @@ template <int count, class Lanes>
 [[gnu::always_inline]] inline void add_loads(const PointBlock& block, const Lanes* strains, int first, int lanes,
                                              const PackedWork& work, double* to) {
   Lanes sums[count] = {};
-  for (int s = 0; s < 6 * block.points; ++s) {
+  for (std::ptrdiff_t s = 0; s < 6 * block.points; ++s) {
     const double* const stress = block.stresses + s * block.loads + first;
 #pragma GCC unroll 12
     for (int c = 0; c < count; ++c) sums[c].of += strains[s].of * stress[c];
@@ -106,7 +107,7 @@ template <class Lanes>
   double* row = work.value;  // of the pair (k, k)
   for (int k = 0; k < work.shapes; row += work.shapes - k, ++k) {
     for (int l = k; l < work.shapes; l += Lanes::width) {
-      for (int p = 0; p < block.points; ++p)
+      for (std::ptrdiff_t p = 0; p < block.points; ++p)
         set_second_order(block.slopes + 9 * p * block.stride, block.stride, k, l, strains + 6 * p);
       const int lanes = std::min(Lanes::width, work.shapes - l);
       int first = 0;
@@ -183,7 +184,7 @@ void add_prestress_work(const FieldSlopes& prestress, const FieldSlopes& shapes,
   if (count == 0 || loads == 0) return;
   const Index padded = (loads + loads_at_once - 1) / loads_at_once * loads_at_once;
   const MatrixXd stress = stresses(prestress, lame, padded);
-  MatrixXd slopes = MatrixXd::Zero(count + Eight::width - 1, 9 * points_at_once);
+  MatrixXd slopes = MatrixXd::Zero(count + Eight::width - 1, Index{9} * points_at_once);
   for (Index first = 0; first < points; first += points_at_once) {
     const Index some = std::min<Index>(points_at_once, points - first);
     slopes.topLeftCorner(count, 9 * some) = shapes.slopes.middleCols(9 * first, 9 * some);

@@ -146,7 +146,7 @@ VectorXd volumes(const Table& table, const MatrixX3d& X) {
   const MatrixX3d J = jacobians(table, X);
   VectorXd volumes(table.weights.size());
   for (Index q = 0; q < volumes.size(); ++q)
-    volumes(q) = table.weights(q) * Matrix3d(J.middleRows<3>(3 * q)).determinant();
+    volumes(q) = table.weights(q) * Matrix3d(J.middleRows<3>(Index{3} * q)).determinant();
   return volumes;
 }
 
@@ -162,7 +162,7 @@ Gradients gradients(const Table& table, const MatrixX3d& X, bool scaled) {
   const MatrixX3d J = jacobians(table, X);
   Gradients g{MatrixXd(3 * n, count), VectorXd(count)};
   for (Index q = 0; q < count; ++q) {
-    const Matrix3d Jt = J.middleRows<3>(3 * q);
+    const Matrix3d Jt = J.middleRows<3>(Index{3} * q);
     g.volumes(q) = table.weights(q) * Jt.determinant();
     const double scale = scaled ? std::sqrt(g.volumes(q)) : 1;
     const Matrix3d inverse = scale * Jt.inverse().transpose();  // (r, i): d xi_r / d x_i
@@ -225,7 +225,7 @@ void visit_strains(const Table& table, const Mesh& mesh, const Element& element,
 int inverted_point(const Table& table, const Mesh& mesh, const Element& element) {
   const MatrixX3d J = jacobians(table, elasticity::local_positions(mesh, element));
   for (Index q = 0; q < table.weights.size(); ++q) {
-    const Matrix3d slopes = J.middleRows<3>(3 * q).transpose();
+    const Matrix3d slopes = J.middleRows<3>(Index{3} * q).transpose();
     if (!elasticity::is_valid(slopes, slopes.determinant())) return static_cast<int>(q);
   }
   return -1;
@@ -289,7 +289,7 @@ void Solid<kind>::validate(const Mesh& mesh, const Element& element) {
     const int q = inverted_point(*table, mesh, element);
     if (q < 0) continue;
     const MatrixX3d J = jacobians(*table, elasticity::local_positions(mesh, element));
-    elasticity::throw_inverted(Matrix3d(J.middleRows<3>(3 * q)).determinant(), q);
+    elasticity::throw_inverted(Matrix3d(J.middleRows<3>(Index{3} * q)).determinant(), q);
   }
 }
 

@@ -134,7 +134,7 @@ void read_coupling(Deck& deck, const Keyword& keyword) {
     if (turned && !(c[0] && c[1] && c[2]))
       deck.fail(keyword.at, "*COUPLING with ORIENTATION is understood if it takes degrees of freedom 1 to 3");
   }
-  deck.rigids.push_back(std::move(coupling));
+  deck.rigids.push_back(coupling);
 }
 
 void read_distributing_coupling(Deck& deck, const Keyword& keyword) {

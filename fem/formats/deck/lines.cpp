@@ -21,7 +21,7 @@ constexpr size_t most_included_bytes = size_t{1} << 32;
 size_t at_index(int i) { return static_cast<size_t>(i); }
 
 bool contains(std::string_view text, std::string_view part) {
-  const std::less_equal<const char*> not_after;
+  const std::less_equal<> not_after;
   return part.data() != nullptr && not_after(text.data(), part.data()) &&
          not_after(part.data(), text.data() + text.size());
 }

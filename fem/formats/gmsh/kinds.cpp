@@ -28,12 +28,14 @@ constexpr int first_high_hexahedron = 92;  // of order 3
 std::vector<int> triquadratic_order() {
   const std::vector<int> lattice = gmsh_hexahedron_order(2), ours = vtk_hexahedron_order(2, false);
   std::vector<int> order;
+  order.reserve(lattice.size());
   for (const int node : lattice) order.push_back(static_cast<int>(std::ranges::find(ours, node) - ours.begin()));
   return order;
 }
 
 std::vector<GmshKind> all_kinds() {
   std::vector<GmshKind> kinds;
+  kinds.reserve(std::size(gmsh_carriers));
   for (const auto& [type, dimension, nodes] : gmsh_carriers) kinds.push_back({type, dimension, nodes, "", 1, {}});
   const std::vector<int> hex27 = triquadratic_order();
   kinds.push_back({4, 3, 4, "tet4", 1, {}});

@@ -66,7 +66,7 @@ VtkSolid vtk_solid(int type, size_t points, bool before_2_1) {
       return {type, row.row, row.order, type == 13 ? linear_wedge_order : std::vector<int>{}};
   }
   for (int p = 1; type == lagrange_hexahedron && p <= max_hexahedron_order; ++p) {
-    const auto n = static_cast<size_t>(p + 1);
+    const size_t n = static_cast<size_t>(p) + 1;
     if (n * n * n == points) return {type, "hex", p, vtk_hexahedron_order(p, before_2_1)};
   }
   return {};

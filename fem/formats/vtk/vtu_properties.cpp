@@ -115,6 +115,7 @@ std::map<long, int> compacted(std::vector<long> numbers) {
 std::vector<long> whole_values(const Field& field, const std::vector<long>& cells) {
   constexpr long highest = std::numeric_limits<int>::max();
   std::vector<long> result;
+  result.reserve(cells.size());
   for (const long cell : cells) result.push_back(field.whole(cell, highest));
   return result;
 }
