@@ -14,7 +14,6 @@
 #include <atomic>
 #include <charconv>
 #include <chrono>
-#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <sstream>
@@ -144,19 +143,10 @@ Scene scene_of(const RunArguments& a) {
       if (b.is_boom()) b.structure = *a.structure;
   if (a.no_budget) scene.error_budget = false;
   scene.verify = a.verify;
-  if (a.loads) {
-    for (HingeScene& h : scene.hinges) h.loads = true;
-    for (JointScene& j : scene.joints) j.loads = j.kind != JointKind::free;
-  }
+  if (a.loads) ask_for_loads(scene);
   if (!a.from.empty()) go_on(scene, a);
   validate(scene);
   return scene;
-}
-
-std::string measured(double value) { return std::isnan(value) ? "not measured" : fmt::format("{:.1e}", value); }
-
-std::string balances(const IntegrationSummary& s) {
-  return fmt::format("energy balance {}, momentum drift {}", measured(s.energy_balance), measured(s.momentum_drift));
 }
 
 /// What reference runs say, and what was estimated of the same outputs.
@@ -183,8 +173,8 @@ void print_summary(const RunResult& r, const std::filesystem::path& folder) {
   fmt::print("{} (relative)\n", balances(s));
   if (r.budget.measured)
     fmt::print("errors of the outputs: discretisation {}, truncation {}, time {}, linearisation {}; total {}\n",
-               measured(r.budget.discretisation), measured(r.budget.truncation), measured(r.budget.time),
-               measured(r.budget.linearisation), measured(r.budget.total()));
+               error_text(r.budget.discretisation), error_text(r.budget.truncation), error_text(r.budget.time),
+               error_text(r.budget.linearisation), error_text(r.budget.total()));
   if (r.budget.measured && r.budget.worst() != nullptr)
     fmt::print("worst output: {}\n", description(*r.budget.worst()));
   print_checks(r);

@@ -153,4 +153,7 @@ std::string to_toml(const BodyScene&);
 /// Checks that reading can not do line by line (also after command-line overrides). @throws InputError.
 void validate(const Scene&);
 
+/// Force and torque of every joint that holds something become outputs.
+void ask_for_loads(Scene&);
+
 }  // namespace flexboom

@@ -218,6 +218,11 @@ void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
                           b.reduced_file.string(), c.name, c.value, c.reference));
 }
 
+void ask_for_loads(Scene& scene) {
+  for (HingeScene& h : scene.hinges) h.loads = true;
+  for (JointScene& j : scene.joints) j.loads = j.kind != JointKind::free;
+}
+
 void validate(const Scene& scene) {
   Faults faults;
   check_scene(scene, faults);

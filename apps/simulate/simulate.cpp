@@ -208,6 +208,13 @@ void take(Run run, RunResult& r) {
 
 }  // namespace
 
+std::string error_text(double error) { return std::isnan(error) ? "not measured" : fmt::format("{:.1e}", error); }
+
+std::string balances(const IntegrationSummary& s) {
+  return fmt::format("energy balance {}, momentum drift {}", error_text(s.energy_balance),
+                     error_text(s.momentum_drift));
+}
+
 bool is_balanced(const IntegrationSummary& s) {
   constexpr double broken = 0.01;  // far above any tolerance that is accepted for a step
   return s.energy_balance <= broken && !(s.momentum_drift > broken);  // which may be unknown

@@ -61,6 +61,12 @@ RunResult run_scene(const Scene&, const RunHooks&,
 /// Do energy and momenta balance as well as any run must? If not, the motion is wrong whatever the tolerance was.
 bool is_balanced(const IntegrationSummary&);
 
+/// How well they do, in words.
+std::string balances(const IntegrationSummary&);
+
+/// A relative error in words; "not measured" of what is unknown.
+std::string error_text(double);
+
 /// How far a body bends in a flight: the largest elastic displacement of any of its points.
 struct Bending {
   double size = 0;       // [m]

@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 #include <limits>
 #include <utility>
@@ -52,9 +51,7 @@ void SweepRunner::note_columns(Scene scene) {
 void SweepRunner::set_options(Scene& scene) const {
   for (size_t i = 0; i < scene.bodies.size(); ++i)
     if (std::exchange(scene.bodies[i].modes_auto, false)) scene.bodies[i].modes = scene_.bodies[i].modes;
-  if (!loads_) return;
-  for (HingeScene& h : scene.hinges) h.loads = true;
-  for (JointScene& j : scene.joints) j.loads = j.kind != JointKind::free;
+  if (loads_) ask_for_loads(scene);
 }
 
 Scene SweepRunner::scene_of_run(size_t run) const {
@@ -93,10 +90,7 @@ RunOutcome SweepRunner::run(size_t run) {
     for (const Quantity& q : quantities_) outcome.quantities.push_back(value_of(q, flown.outputs));
     if (keep_trajectories_) outcome.trajectory = std::move(flown.outputs);
     const IntegrationSummary& s = flown.motion.summary;
-    if (!is_balanced(s))
-      fail(RunStatus::numerical,
-           fmt::format("energy balance {:.1e}, momentum drift {}: the motion is wrong", s.energy_balance,
-                       std::isnan(s.momentum_drift) ? "not measured" : fmt::format("{:.1e}", s.momentum_drift)));
+    if (!is_balanced(s)) fail(RunStatus::numerical, fmt::format("{}: the motion is wrong", balances(s)));
   } catch (const InputError& error) {
     fail(RunStatus::input, error.what());
   } catch (const NumericalError& error) {
