@@ -1,5 +1,7 @@
 #include "apps/commands/commands.hpp"
+#include "apps/model/bounded_modes.hpp"
 #include "fem/base/check.hpp"
+#include "fem/base/stopwatch.hpp"
 #include "fem/formats/common/mesh_file.hpp"
 #include "fem/formats/vtk/vtk.hpp"
 #include "reduction/invariants/inertia_invariants.hpp"
@@ -8,8 +10,10 @@
 #include <sys/resource.h>
 #include <nlohmann/json.hpp>
 
-#include <chrono>
+#include <cmath>
 #include <numbers>
+#include <tuple>
+#include <utility>
 
 namespace flexboom {
 
@@ -26,29 +30,9 @@ double peak_memory_mb() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-/// Wall time and peak memory of the stages, one after another.
-class Stages {  // NOLINT(bugprone-exception-escape): of maps that are moved
- public:
-  void end(const std::string& name) {
-    const auto now = std::chrono::steady_clock::now();
-    const double elapsed = std::chrono::duration<double>(now - last_).count();
-    last_ = now;
-    total_ += elapsed;
-    seconds_[name] = elapsed;
-    memory_[name] = peak_memory_mb();
-  }
-  double seconds(const std::string& name) const { return seconds_.at(name); }
-  double total() const { return total_; }
-  const ordered_json& memory() const { return memory_; }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-  double total_ = 0;
-  ordered_json seconds_, memory_;
-};
-
 /// Points of the mesh and every shape as a field of displacement over them. Beams are drawn along their deformed axis.
-VtkGrid shapes_grid(const Model& model, const Assembly& assembly, const ModalBasis& basis) {
+VtkGrid shapes_grid(const BoundedModes& m) {
+  const auto& [model, assembly, basis] = std::tie(m.model, m.assembly, m.basis);
   const auto is_beam = [](const Element& e) { return type_of(e).shape == Shape::line; };
   const auto field_name = [&basis](int k) {
     return fmt::format("mode_{:03d}_{}", k + 1, name_of(basis.kind[static_cast<size_t>(k)]));
@@ -77,31 +61,47 @@ VtkGrid shapes_grid(const Model& model, const Assembly& assembly, const ModalBas
   return grid;
 }
 
-ordered_json json_of(const Model& model, const ModalBasis& basis, const Stages& stages) {
+/// Numbers, null where one is unknown.
+ordered_json known(const Eigen::VectorXd& values) {
+  ordered_json list = ordered_json::array();
+  for (const double v : values) list.push_back(std::isnan(v) ? ordered_json(nullptr) : ordered_json(v));
+  return list;
+}
+
+template <class T>
+ordered_json null_or(const std::optional<T>& value) {
+  return value ? ordered_json(*value) : ordered_json(nullptr);
+}
+
+double worst_bound(const BoundedModes& m) { return m.bounds.worst(m.basis.rigid_freedoms); }
+
+ordered_json json_of(const BoundedModes& m, double total_seconds) {
+  const ModalBasis& basis = m.basis;
   const EigenSummary& s = basis.summary;
   const Eigen::VectorXd hz = basis.omega / (2 * std::numbers::pi);
   std::vector<std::string_view> kinds;
   for (const ModeKind k : basis.kind) kinds.push_back(name_of(k));
   return {{"frequencies_hz", std::vector<double>(hz.begin(), hz.end())},
+          {"error_bounds", known(m.bounds.relative)},
+          {"error_bounds_found", m.bounds.how},
+          {"accuracy", null_or(m.accuracy)},
+          {"accuracy_met", null_or(m.met())},
           {"kinds", kinds},
           {"dofs", basis.unknowns},
-          {"elements", model.mesh.elements.size()},
+          {"elements", m.model.mesh.elements.size()},
           {"mass", basis.mass},
           {"rigid_freedoms", basis.rigid_freedoms},
           {"seconds",
-           {{"mesh", stages.seconds("mesh")},
-            {"assemble", stages.seconds("assemble")},
+           {{"mesh", m.mesh_seconds},
+            {"assemble", m.assemble_seconds},
             {"analyse", s.analyse_seconds},
             {"factor", s.factor_seconds},
             {"eigen", s.eigen_seconds},
             {"verify", s.verify_seconds},
-            {"modes", stages.seconds("modes")},
-            {"total", stages.total()}}},
-          {"memory_mb",
-           {{"mesh", stages.memory().at("mesh")},
-            {"assemble", stages.memory().at("assemble")},
-            {"modes", stages.memory().at("modes")},
-            {"factor", s.factor_bytes / (1 << 20)}}},
+            {"modes", m.modes_seconds},
+            {"bounds", m.bound_seconds},
+            {"total", total_seconds}}},
+          {"factor_mb", s.factor_bytes / (1 << 20)},
           {"backend", s.backend},
           {"ordering", s.ordering},
           {"factor_entries", s.factor_nonzeros},
@@ -112,25 +112,34 @@ ordered_json json_of(const Model& model, const ModalBasis& basis, const Stages& 
           {"sturm_count", s.sturm_checked ? ordered_json(s.sturm_count) : ordered_json(nullptr)},
           {"proof", s.proof},
           {"pairs", s.pairs},
-          {"notes", model.notes},
+          {"notes", m.model.notes},
           {"peak_memory_mb", peak_memory_mb()}};
 }
 
-void print_table(const Model& model, const ModalBasis& basis, const Stages& stages) {
+void print_table(const BoundedModes& m, double total_seconds) {
+  const ModalBasis& basis = m.basis;
   const EigenSummary& s = basis.summary;
-  fmt::print("{}: {} elements, {} unknowns, mass {:.9g} kg\n", model.name, model.mesh.elements.size(), basis.unknowns,
-             basis.mass);
+  fmt::print("{}: {} elements, {} unknowns, mass {:.9g} kg\n", m.model.name, m.model.mesh.elements.size(),
+             basis.unknowns, basis.mass);
   for (Eigen::Index k = 0; k < basis.omega.size(); ++k) {
-    fmt::print("{:4}  {:18.10f} Hz  {}\n", k + 1, basis.omega(k) / (2 * std::numbers::pi),
+    const double bound = m.bounds.relative[k];
+    fmt::print("{:4}  {:18.10f} Hz  {:<8}  {}\n", k + 1, basis.omega(k) / (2 * std::numbers::pi),
+               k < basis.rigid_freedoms ? ""
+               : std::isnan(bound)      ? "?"
+                                        : fmt::format("+-{:.0e}", bound),
                name_of(basis.kind[static_cast<size_t>(k)]));
   }
+  const double worst = worst_bound(m);
+  print_note(fmt::format("errors of the mesh: {}, {}",
+                         std::isnan(worst) ? "not known of every mode" : fmt::format("at most {:.1e}", worst),
+                         m.bounds.how));
   print_note(fmt::format("{}: residual {:.1e}, orthogonality {:.1e}; {}", s.backend, s.residual_max,
                          s.orthogonality_error, s.proof));
   print_note(
       fmt::format("{:.3f} s: mesh {:.3f}, assembly {:.3f}, analysis {:.3f}, factor {:.3f}, modes {:.3f}, "
-                  "verification {:.3f}; {:.0f} MB",
-                  stages.total(), stages.seconds("mesh"), stages.seconds("assemble"), s.analyse_seconds,
-                  s.factor_seconds, s.eigen_seconds, s.verify_seconds, peak_memory_mb()));
+                  "verification {:.3f}, bounds {:.3f}; {:.0f} MB",
+                  total_seconds, m.mesh_seconds, m.assemble_seconds, s.analyse_seconds, s.factor_seconds,
+                  s.eigen_seconds, s.verify_seconds, m.bound_seconds, peak_memory_mb()));
 }
 
 EigenOptions eigen_options(const ModesArguments& a, const Model& model) {
@@ -147,22 +156,25 @@ EigenOptions eigen_options(const ModesArguments& a, const Model& model) {
 
 int modes_command(const ModesArguments& a, const CommonOptions& common) {
   require(!a.count || *a.count > 0, "--count must be positive");
-  Stages stages;
+  const Stopwatch clock;
   Model model = load_model(a.model, a.options);
-  stages.end("mesh");
+  const double load_seconds = clock.seconds();
   if (!common.quiet) {
     for (const std::string& note : model.notes) print_note("note: " + note);
   }
-  Assembly assembly = assemble(model.mesh, common.threads);
-  stages.end("assemble");
-  const ModalBasis basis =
-      clamped_modes_releasing(model.mesh, assembly, model.clamp, eigen_options(a, model), common.threads);
-  stages.end("modes");
-  if (!a.vtu.empty()) write_vtu(a.vtu, shapes_grid(model, assembly, basis));
+  const EigenOptions options = eigen_options(a, model);
+  BoundedModes m = bounded_modes(std::move(model), options, common.threads);
+  m.mesh_seconds += load_seconds;
+  if (!a.vtu.empty()) write_vtu(a.vtu, shapes_grid(m));
   if (common.json) {
-    fmt::print("{}\n", json_of(model, basis, stages).dump(2));
+    fmt::print("{}\n", json_of(m, clock.seconds()).dump(2));
   } else if (!common.quiet) {
-    print_table(model, basis, stages);
+    print_table(m, clock.seconds());
+  }
+  if (m.met() == false && !common.quiet) {
+    const double worst = worst_bound(m);
+    print_note(fmt::format("warning: the accuracy wanted, {:.1e}, was not reached, or not proven: the bound is {}",
+                           *m.accuracy, std::isnan(worst) ? "not known" : fmt::format("{:.1e}", worst)));
   }
   return exit_ok;
 }

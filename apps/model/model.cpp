@@ -11,6 +11,10 @@
 namespace flexboom {
 namespace {
 
+void hold(Model& model) {
+  if (!model.clamped.empty()) model.clamp = node_set(model.mesh, model.clamped);
+}
+
 Model body_model(const std::filesystem::path& path, const ModelOptions& options) {
   BodyScene body = read_body(path);
   require(!options.read.dialect, fmt::format("--dialect: is for decks (.inp); {} is a body file", path.string()));
@@ -36,7 +40,9 @@ Model body_model(const std::filesystem::path& path, const ModelOptions& options)
   if (body.structure == "eq14")
     model.notes.emplace_back(
         "modes solves finite elements; the closed form of structure = \"eq14\" is in `flexboom compare`");
-  if (!options.free) model.clamp = node_set(model.mesh, options.clamp.value_or(body.clamp));
+  if (!options.free) model.clamped = options.clamp.value_or(body.clamp);
+  model.body = std::move(body);
+  hold(model);
   return model;
 }
 
@@ -69,6 +75,14 @@ Material parse_material(const std::string& text) {
           fmt::format("--material: '{}' is not E,nu,rho, e.g. 67e9,0.33,2840", text));
   m.validate();
   return m;
+}
+
+Model refined(const Model& model, int steps) {
+  require(model.body.has_value(), fmt::format("{}: a mesh file has no finer mesh", model.name));
+  Model r = model;
+  r.mesh = mesh_of(*model.body, steps);
+  hold(r);
+  return r;
 }
 
 Model load_model(const std::filesystem::path& path, const ModelOptions& options) {

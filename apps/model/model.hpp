@@ -1,5 +1,6 @@
 #pragma once
 
+#include "apps/scene/scene.hpp"
 #include "fem/assembly/constraints.hpp"
 #include "fem/formats/common/mesh_file.hpp"
 #include "reduction/basis/basis.hpp"
@@ -34,7 +35,13 @@ struct Model {
   std::optional<std::string> backend;  // eigen-solver that the file asks for
   DampingRule damping;                 // none of mesh files
   BasisOptions basis;                  // its names and places; clamped of mesh files
+  std::optional<BodyScene> body;       // of which the mesh is made; none of mesh files
+  std::string clamped;                 // node set of `body` that is held; empty: none
 };
+
+/// The model on a mesh that is so many steps finer than that of its body, as mesh_of.
+/// @throws InputError where it is no boom, or has no mesh that is so coarse.
+Model refined(const Model&, int steps);
 
 /// @throws InputError naming the file and the place in it, a set that it lacks, or an option that does not apply to it.
 Model load_model(const std::filesystem::path&, const ModelOptions&);

@@ -79,15 +79,10 @@ Mesh beam_mesh(BeamGeometry geometry, int refine) {
 }
 
 Mesh solid_mesh(const BodyScene& b, int refine) {
-  if (b.solid.element != "hex") {
-    require(refine == 0, fmt::format("body {}: elements {} have no higher order to be compared with; use \"hex\"",
-                                     b.name, b.solid.element));
-    return make_solid_mesh(b.geometry, b.solid);
-  }
-  SolidOptions options = chosen(b.geometry, b.solid);
-  constexpr int highest = 8;
-  options.order = std::min(options.order + refine, highest);
-  return make_solid_mesh(b.geometry, options);
+  if (refine == 0) return make_solid_mesh(b.geometry, b.solid);
+  const std::optional<SolidOptions> options = refined(chosen(b.geometry, b.solid), refine);
+  require(options.has_value(), fmt::format("body {}: there is no coarser mesh of its elements", b.name));
+  return make_solid_mesh(b.geometry, *options);
 }
 
 /// What a scene says of a basis, its shapes chosen by `modes` and `directions`.

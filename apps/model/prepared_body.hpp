@@ -20,8 +20,8 @@ struct PreparedBody {
   std::filesystem::path kept;      // the file that later runs read it from; empty: none
 };
 
-/// Elements of a boom. `refine` raises their order, or where that is the highest makes beams smaller.
-/// @throws InputError for elements that have no higher order.
+/// Elements of a boom. `refine` raises their order, or where that is the highest makes them smaller; of solids it also
+/// refines singular rims. @throws InputError where there is no mesh that is so coarse.
 Mesh mesh_of(const BodyScene&, int refine = 0);
 
 /// Geometry -> mesh -> K, M -> basis -> reduced body, or the closed form, or the body that the scene gives.

@@ -154,11 +154,11 @@ void solid_keys(Archive& a, SolidOptions& o) {
   a.key({"element", "",
          R"(`"hex"`, or `"hex8"`, `"hex8-reduced"`, `"hex20"`, `"hex20-reduced"`, `"hex27"`, `"tet4"`, `"tet10"`)"},
         o.element);
-  a.key({"accuracy", "",
-         "relative error wanted in the first ten frequencies of a clamped boom, 1e-8 or more; what is left open is "
-         "chosen "
-         "by it"},
-        o.accuracy);
+  a.key(
+      {"accuracy", "",
+       "relative error wanted in the frequencies, 1e-8 or more; a mesh left open starts by it, and `modes` refines it "
+       "until it is met"},
+      o.accuracy);
   a.key({"order", "", "of `\"hex\"`, 1 to 8; 0: chosen"}, o.order);
   a.key({"slit", "m", "width of a slit along every tube, at +y, on the midline of the wall; 0: closed"}, o.slit);
   a.table({"grading", "", "Sizes of the elements."}, o.grading, grading_keys);

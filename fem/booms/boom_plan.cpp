@@ -2,6 +2,7 @@
 
 #include "fem/base/check.hpp"
 #include "fem/base/round_off.hpp"
+#include "fem/booms/solid_cells.hpp"
 #include "fem/mesh/validation.hpp"
 
 #include <fmt/format.h>
@@ -20,6 +21,7 @@ constexpr int max_solid_order = 8;
 // frequencies of a bar are wrong by 2e-6 instead of 1.2e-5; the area pays 4e-6 (p = 4) to 4e-13 (p = 8).
 constexpr double uneven_quarter = 0.03;
 constexpr double slender_ratio = 62;   // length over half depth
+constexpr int longest_element = 4;     // by its width, of order 4 or more
 constexpr int max_divisions = 100000;  // of anything; more is a typing error
 
 bool same(double a, double b) { return std::abs(a - b) <= relative_round_off * std::max(std::abs(a), std::abs(b)); }
@@ -208,7 +210,7 @@ std::array<int, 2> sectors_of(const BeamGeometry& boom, const SolidOptions& opti
   const SectionShape& shape = boom.segments.front().start;
   if (!is_rectangle(shape)) return sectors;
   const Eigen::Vector2d size = extent(shape);
-  const double stretch = std::min(options.order, 4);
+  const double stretch = std::min(options.order, longest_element);
   for (size_t k = 0; k < 2; ++k) {
     const double along = size(k == 0 ? 1 : 0);  // the sides that face y run along z
     sectors[k] = std::max(n, static_cast<int>(std::ceil(n * along / size.minCoeff() / stretch - 1e-9)));
@@ -281,8 +283,8 @@ struct Choice {
 };
 constexpr std::array<Choice, 9> choices = {{{1, 1, {4, 3, 120, 0, 1, 3, 0, 0.15}},
                                             {1, 2, {2, 2, 30, 1, 1, 3, 0, 0.15}},
-                                            {1e-3, 3, {1, 1, 9, 1, 1, 3, 1, 0.15}},
-                                            {1e-4, 4, {1, 1, 6, 1, 1, 3, 1, 0.15}},
+                                            {1e-3, 3, {1, 1, 9, 2, 0.5, 3, 1, 0.1}},
+                                            {1e-4, 4, {1, 1, 6, 2, 0.5, 3, 1, 0.1}},
                                             {1e-5, 4, {1, 1, 9, 2, 0.5, 3, 1, 0.1}},
                                             {1e-6, 5, {1, 1, 6, 2, 0.5, 3, 2, 0.1}},
                                             {1e-7, 6, {1, 1, 5, 2, 0.5, 3, 3, 0.1}},
@@ -301,12 +303,21 @@ const Choice& choice_for(const SolidOptions& options) {
   return *best;
 }
 
+// A field that is even about the middle of an element gains nothing from an odd order: two meshes would seem to agree.
+// So no side that bends has one element. The short sides of a slender solid rectangle hardly bend.
+int fewest_sectors(const BeamGeometry& boom) {
+  const SectionShape& shape = boom.segments.front().start;
+  if (std::holds_alternative<RectangularTube>(shape)) return 2;
+  const Eigen::Vector2d size = extent(shape);
+  return std::holds_alternative<Rectangle>(shape) && size.maxCoeff() <= longest_element * size.minCoeff() ? 2 : 1;
+}
+
 void choose(const BeamGeometry& boom, SolidOptions& options) {
   const Choice& choice = choice_for(options);
   SolidGrading& g = options.grading;
   const SolidGrading& best = choice.grading;
   options.order = choice.order;
-  if (g.sectors == 0) g.sectors = best.sectors;
+  if (g.sectors == 0) g.sectors = std::max(best.sectors, fewest_sectors(boom));
   if (g.rings == 0) g.rings = best.rings;
   if (g.long_elements == 0) {
     // More slender booms have the fifth pair of bending modes (wave number 14.14 / L after 11.00 / L) among the first
@@ -324,13 +335,35 @@ void choose(const BeamGeometry& boom, SolidOptions& options) {
 }  // namespace
 
 SolidOptions chosen(const BeamGeometry& boom, const SolidOptions& options) {
-  validate(boom, options);
   SolidOptions result = options;
+  if (const CellKind& kind = cell_kind(options.element); kind.order > 0) {
+    require(options.order == 0 || options.order == kind.order,
+            fmt::format("order is {}; \"{}\" has order {}, leave it out", options.order, kind.name, kind.order));
+    result.order = kind.order;
+  }
+  validate(boom, result);
   choose(boom, result);
   // A wall has a singular rim on both faces, which one quadrilateral cannot be refined toward.
   const bool thin = !has_core(boom.segments.front().start);
   if (thin && result.grading.corner_levels > 0) result.grading.rings = std::max(result.grading.rings, 2);
   return result;
+}
+
+std::optional<SolidOptions> refined(const SolidOptions& complete, int steps) {
+  SolidOptions r = complete;
+  if (steps == 0) return r;
+  if (r.element != "hex") {
+    if (steps < 0) return {};
+    r.order = cell_kind(r.element).order;
+    r.element = "hex";
+  }
+  r.order += steps;
+  if (r.order < 1) return {};
+  SolidGrading& g = r.grading;
+  for (; r.order > max_solid_order; --r.order) g.sectors *= 2, g.rings *= 2, g.long_elements *= 2;
+  constexpr int most_levels = 20;
+  g.corner_levels = std::clamp(g.corner_levels + steps, 0, most_levels);
+  return r;
 }
 
 BoomPlan plan_of(const BeamGeometry& boom, const SolidOptions& options) {

@@ -271,17 +271,11 @@ void add_attachments(Mesh& mesh, const BeamGeometry& boom, const std::vector<dou
 
 Mesh make_solid_mesh(const BeamGeometry& boom, const SolidOptions& options) {
   const CellKind& kind = cell_kind(options.element);
-  SolidOptions wanted = options;
-  if (kind.order > 0) {
-    require(options.order == 0 || options.order == kind.order,
-            fmt::format("order is {}; \"{}\" has order {}, leave it out", options.order, kind.name, kind.order));
-    wanted.order = kind.order;
-  }
   // Cut trapezoids of a refined corner would be slivers with bent edges.
   require(!options.element.starts_with("tet") || options.grading.corner_levels <= 0,
           fmt::format("grading: corner_levels is {}; it is for hexahedra, leave it out for \"{}\"",
                       options.grading.corner_levels, kind.name));
-  const BoomPlan plan = plan_of(boom, wanted);
+  const BoomPlan plan = plan_of(boom, options);
   const Lattice lattice(boom, plan);
   Mesh mesh;
   mesh.nodes = lattice.positions();

@@ -878,6 +878,21 @@ class Vtu(Case):
             self.assertEqual(abs(shape[np.argmin(mesh.points[:, 0])]).max(), 0, "the root is clamped")
 
 
+BOOM4_SOLID_HZ = [74.57570632384, 74.57570632384, 465.60850721105, 465.60850721105, 1296.0223559708, 1296.0223559708]
+
+RECTANGULAR_TUBE = """format = "flexboom-body-1"
+name = "walls"
+structure = "solid"
+[[segments]]
+shape = "rectangular-tube"
+height = 0.03
+width = 0.02
+thickness = 0.0015
+length = 0.4
+material = { E = 67e9, nu = 0.33, rho = 2840.0 }
+"""
+
+
 class Solids(Case):
     """Body to solid mesh, mesh from format to format, each with the same modes."""
 
@@ -893,10 +908,47 @@ class Solids(Case):
 
     def test_a_solid_body_has_the_modes_of_three_dimensional_elasticity(self):
         document = self.modes(BOOM4, "--structure", "solid", "--accuracy", "1e-4")
-        exact = [74.57570632384, 74.57570632384, 465.60850721105, 465.60850721105, 1296.0223559708, 1296.0223559708]
-        np.testing.assert_allclose(document["frequencies_hz"], exact, rtol=1e-4)
+        np.testing.assert_allclose(document["frequencies_hz"], BOOM4_SOLID_HZ, rtol=1e-4)
         self.assertEqual(sorted(document["kinds"][:2]), ["bending_y", "bending_z"])
         self.assertTrue(document["proof"])
+
+    def assert_bounds_hold(self, document, exact):
+        errors = abs(np.array(document["frequencies_hz"]) / exact - 1)
+        bounds = np.array(document["error_bounds"])
+        self.assertTrue((errors <= bounds).all(), np.array([errors, bounds]))
+        return bounds.max()
+
+    def test_a_mesh_is_refined_until_its_bounds_are_within_the_accuracy(self):
+        # order 7, four levels of refined rims: good to 1e-7, by its change from order 6
+        exact = np.array(BOOM4_SOLID_HZ)
+        for accuracy in (1e-2, 1e-3, 1e-4):
+            document = self.modes(BOOM4, "--structure", "solid", "--accuracy", str(accuracy))
+            self.assertIs(document["accuracy_met"], True)
+            self.assertLessEqual(self.assert_bounds_hold(document, exact), accuracy)
+
+    def test_a_mesh_that_is_given_stays_and_its_bounds_tell(self):
+        result = flexboom("modes", BOOM4, "--structure", "solid", "--accuracy", "1e-6", "--order", "3", "--count", "6",
+                          "--json")
+        self.assert_exit(OK, result)
+        document = json.loads(result.stdout)
+        self.assertIs(document["accuracy_met"], False)
+        self.assertGreater(self.assert_bounds_hold(document, np.array(BOOM4_SOLID_HZ)), 1e-6)
+        self.assertIn("was not reached, or not proven: the bound is", result.stderr)
+
+    def test_bounds_of_thin_walls_hold(self):
+        body = self.folder / "walls.toml"
+        body.write_text(RECTANGULAR_TUBE)
+        document = self.modes(body, "--accuracy", "1e-2", "--count", "2", "--verify", "basic")
+        self.assertIs(document["accuracy_met"], True)
+        # order 6, three elements per side: good to 1e-4, by its change from order 5
+        self.assert_bounds_hold(document, np.array([134.4498036, 185.6202468]))
+
+    def test_what_has_no_finer_mesh_has_no_bounds(self):
+        deck = self.mesh(BOOM4, "boom.inp", "--structure", "solid", "--element", "hex20")
+        document = self.modes(deck, "--clamp", "root", "--material", "67e9,0.33,2840")
+        self.assertEqual(document["error_bounds"], [None] * 6)
+        self.assertIsNone(document["accuracy_met"])
+        self.assertIn("a mesh file has no finer mesh", document["error_bounds_found"])
 
     def test_formats_hold_the_same_body(self):
         clamp = ["--clamp", "root", "--material", "67e9,0.33,2840"]
@@ -975,13 +1027,16 @@ class Modes(Case):
         self.check_types(document, {
             "frequencies_hz": list, "dofs": int, "elements": int, "mass": number, "backend": str,
             "residual_max": number, "orthogonality_error": number, "sturm_count": int, "pairs": list,
-            "peak_memory_mb": number,
+            "peak_memory_mb": number, "error_bounds": list, "error_bounds_found": str,
+            "accuracy": type(None), "accuracy_met": type(None),
             "seconds": {k: number for k in ("mesh", "assemble", "factor", "eigen", "total")}})
         self.assertEqual(len(document["frequencies_hz"]), 10)
         self.assertGreaterEqual(document["sturm_count"], 10)
         # rho L pi d^2 / 4 in double precision
         self.assertAlmostEqual(document["mass"] / (2840 * 0.302 * math.pi * 0.01**2 / 4), 1, delta=1e-13)
         self.assertIn([0, 1], document["pairs"])
+        # five elements of order 8 against ten
+        self.assertTrue(all(0 < bound < 1e-8 for bound in document["error_bounds"]), document["error_bounds"])
 
     def test_frequencies_of_boom_4(self):
         text = BOOM4.read_text()

@@ -331,6 +331,31 @@ TEST(SolidBoom, AccuracyChoosesTheRestAndKeepsWhatIsGiven) {
   EXPECT_GT(chosen(uniform(RoundBar{0.01}, 0.6), {}).grading.long_elements, chosen(boom, {}).grading.long_elements);
 }
 
+TEST(SolidBoom, ARefinedMeshHasAHigherOrderAndFinerRims) {
+  const BeamGeometry boom = uniform(RoundBar{0.01}, 0.302);
+  SolidOptions wanted;
+  wanted.accuracy = 1e-3;
+  const SolidOptions start = chosen(boom, wanted);
+  ASSERT_EQ(start.order, 3);
+  for (const int steps : {-1, 1, 5}) {
+    const SolidOptions other = refined(start, steps).value();
+    EXPECT_EQ(other.order, start.order + steps);
+    EXPECT_EQ(other.grading.corner_levels, start.grading.corner_levels + steps);
+    EXPECT_EQ(other.grading.long_elements, start.grading.long_elements);
+  }
+  EXPECT_FALSE(refined(start, -3));
+  const SolidOptions halved = refined(start, 6).value();  // there is no order 9
+  EXPECT_EQ(halved.order, 8);
+  EXPECT_EQ(halved.grading.long_elements, 2 * start.grading.long_elements);
+  EXPECT_EQ(halved.grading.sectors, 2 * start.grading.sectors);
+  SolidOptions given;
+  given.element = "hex20";
+  const SolidOptions serendipity = chosen(boom, given);
+  EXPECT_FALSE(refined(serendipity, -1));
+  EXPECT_EQ(refined(serendipity, 1)->element, "hex");
+  EXPECT_EQ(refined(serendipity, 1)->order, 3);
+}
+
 TEST(SolidBoom, BadInputIsNamed) {
   const BeamGeometry boom = uniform(RoundBar{0.01});
   const auto error = [&](const std::function<void(SolidOptions&)>& change) {

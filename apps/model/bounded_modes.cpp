@@ -1,0 +1,133 @@
+// Bounds of discretisation errors: the mesh of a model beside finer ones of the same boom.
+
+#include "apps/model/bounded_modes.hpp"
+
+#include "dynamics/events/flight.hpp"
+#include "fem/base/check.hpp"
+#include "fem/base/stopwatch.hpp"
+#include "fem/booms/solid_boom.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <variant>
+
+namespace flexboom {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double unresolved = 0.1;        // change of a frequency
+constexpr double round_off = 1e-12;       // of a frequency by any mesh
+constexpr int most_steps = 3;             // to finer meshes
+constexpr Index most_unknowns = 120'000;  // about a minute, and four gigabytes
+
+bool is_solid(const Model& model) { return model.body && model.body->structure == "solid"; }
+
+/// May the program refine the mesh? It may where only the accuracy of hexahedra is given.
+bool follows_accuracy(const Model& model) {
+  if (!is_solid(model)) return false;
+  const SolidOptions& s = model.body->solid;
+  const SolidGrading& g = s.grading;
+  return s.element == "hex" && s.order == 0 && g.sectors == 0 && g.rings == 0 && g.long_elements == 0 &&
+         g.end_layers < 0 && g.first_layer == 0 && g.growth == 0 && g.corner_levels < 0 && g.factor == 0;
+}
+
+/// Of the errors from one mesh to the next. Edges along the boom are singular, and no mesh is refined toward them.
+double slowest_fall(const Model& model) {
+  constexpr double smooth = 0.5, singular = 0.65;
+  if (!is_solid(model)) return smooth;
+  const BodyScene& body = *model.body;
+  const bool edges = std::ranges::any_of(
+      body.geometry.segments, [](const BeamSegment& s) { return std::holds_alternative<RectangularTube>(s.start); });
+  return edges || body.solid.slit > 0 ? singular : smooth;
+}
+
+BoundedModes modes_of(Model model, const EigenOptions& options, int threads) {
+  BoundedModes r;
+  Stopwatch clock;
+  r.assembly = assemble(model.mesh, threads);
+  r.assemble_seconds = clock.lap();
+  r.basis = clamped_modes_releasing(model.mesh, r.assembly, model.clamp, options, threads);
+  r.modes_seconds = clock.lap();
+  if (is_solid(model)) r.accuracy = model.body->solid.accuracy;
+  r.model = std::move(model);
+  return r;
+}
+
+double seconds_of(const BoundedModes& m) { return m.mesh_seconds + m.assemble_seconds + m.modes_seconds; }
+
+/// The same boom on a mesh that is `steps` finer. Empty: there is none, or it is too large.
+std::optional<BoundedModes> finer(const Model& model, int steps, const EigenOptions& options, int threads) {
+  Stopwatch clock;
+  try {
+    Model next = refined(model, steps);
+    if (next.mesh.nodes.size() > most_unknowns) return {};
+    const double mesh_seconds = clock.seconds();
+    BoundedModes r = modes_of(std::move(next), options, threads);
+    r.mesh_seconds = mesh_seconds;
+    return r;
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
+/// Bounds of `m` where `share` of its error, or more, is its change to the other mesh. The k-th frequency of one mesh
+/// and the k-th of another, in ascending order, approach the same limit. A change that is fifty times smaller than
+/// the largest is small by accident.
+FrequencyBounds bounds_of(const ModalBasis& m, const ModalBasis& other, double share) {
+  FrequencyBounds r{VectorXd::Constant(m.omega.size(), unknown), "from the next finer mesh"};
+  const Index first = m.rigid_freedoms, n = std::min(m.omega.size(), other.omega.size()) - first;
+  if (n <= 0) return r;
+  const Eigen::ArrayXd change = (m.omega.segment(first, n).array() / other.omega.segment(first, n).array() - 1).abs();
+  for (Index k = 0; k < n; ++k)
+    if (change[k] < unresolved)
+      r.relative[first + k] = std::max(change[k], change.maxCoeff() / 50) / share + m.summary.residual_max + round_off;
+  return r;
+}
+
+}  // namespace
+
+double FrequencyBounds::worst(int rigid_freedoms) const {
+  double r = 0;
+  for (Index k = rigid_freedoms; k < relative.size(); ++k) {
+    if (std::isnan(relative[k])) return unknown;
+    r = std::max(relative[k], r);
+  }
+  return r;
+}
+
+std::optional<bool> BoundedModes::met() const {
+  if (!accuracy) return {};
+  return bounds.worst(basis.rigid_freedoms) <= *accuracy;
+}
+
+BoundedModes bounded_modes(Model model, const EigenOptions& options, int threads) {
+  const bool refine = follows_accuracy(model);
+  BoundedModes here = modes_of(std::move(model), options, threads);
+  here.bounds.relative = VectorXd::Constant(here.basis.omega.size(), unknown);
+  here.bounds.how = "a mesh file has no finer mesh to be compared with";
+  if (!here.model.body) return here;
+  here.bounds.how = "there is no finer mesh that is small enough to be compared with";
+  const Model start = here.model;
+  const double fall = slowest_fall(start);
+  for (int i = 1; i <= 1 + most_steps; ++i) {
+    std::optional<BoundedModes> next = finer(start, i, options, threads);
+    if (!next) return here;
+    here.bounds = bounds_of(here.basis, next->basis, 1 - fall);
+    if (!refine || here.met() == true) {
+      here.bound_seconds += seconds_of(*next);
+      return here;
+    }
+    next->bounds = bounds_of(next->basis, here.basis, (1 - fall) / fall);
+    next->bounds.how = "from the mesh one step coarser";
+    next->bound_seconds = here.bound_seconds + seconds_of(here);
+    here = std::move(*next);
+    if (here.met() == true) return here;
+  }
+  return here;
+}
+
+}  // namespace flexboom

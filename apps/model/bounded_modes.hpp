@@ -1,0 +1,49 @@
+#pragma once
+
+#include "apps/model/model.hpp"
+#include "fem/assembly/assembly.hpp"
+#include "reduction/basis/modal_basis.hpp"
+
+#include <Eigen/Core>
+
+#include <optional>
+#include <string>
+
+namespace flexboom {
+
+/// What the elements of a model change in its frequencies.
+struct FrequencyBounds {
+  Eigen::VectorXd relative;  // of each frequency; unknown (NaN) of rigid motions and of what the mesh does not resolve
+  std::string how;           // they were found; or why there are none
+
+  /// The largest, of the elastic modes; unknown where one of them is.
+  double worst(int rigid_freedoms) const;
+};
+
+/// Modes of a model whose frequencies have bounds.
+struct BoundedModes {
+  Model model;  // whose modes these are
+  Assembly assembly;
+  ModalBasis basis;
+  FrequencyBounds bounds;
+  double mesh_seconds = 0, assemble_seconds = 0, modes_seconds = 0;  // of this model
+  double bound_seconds = 0;                                          // of all other meshes
+  std::optional<double> accuracy;  // that is asked of the mesh; none but of solid booms
+
+  /// Is every bound within the accuracy? Not known where no accuracy is asked.
+  std::optional<bool> met() const;
+};
+
+/// Modes of a model, each frequency with a bound from a mesh of the same boom that is one step finer (`refined`).
+///
+/// From one mesh to the next, errors are assumed to fall by a factor f or more: 0.5, or 0.65 where edges along the boom
+/// are singular (slits, rectangular tubes). The change of a frequency is then at least 1 - f of the coarser mesh's
+/// error, and at least (1 - f) / f of the finer one's. A bound is never less than a fiftieth of the largest.
+/// Where the change is a tenth of the frequency or more, the coarser mesh does not resolve the mode.
+///
+/// A solid boom of which no more than the accuracy is given (SolidOptions) goes on to finer meshes until it is met,
+/// three steps at most, and none of more than 120 000 unknowns.
+/// @throws InputError, NumericalError as clamped_modes.
+BoundedModes bounded_modes(Model, const EigenOptions&, int threads);
+
+}  // namespace flexboom
