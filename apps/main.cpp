@@ -73,6 +73,9 @@ struct CommandLine {
     c->add_option("--duration", run.duration, "Simulated time [s]");
     c->add_option("--tolerance", run.tolerance, "Relative error wanted in the outputs");
     c->add_option("--modes", run.modes, "Elastic coordinates of every body: a number, or auto");
+    c->add_option("--plan", run.plan,
+                  "Models of the bodies as another run chose them: its results folder or scene.toml")
+        ->excludes("--modes");
     c->add_option("--structure", run.structure, "Model of every body: eq14, beam or rigid");
     c->add_option("--formulation", run.formulation, "relative or multipliers");
     c->add_option("--integrator", run.integrator, "Integration method");

@@ -22,7 +22,7 @@ struct Case {
 Scene sport(int modes, double duration) {
   Scene scene = load_scene("sport");
   scene.duration = duration;
-  for (BodyScene& b : scene.bodies) b.structure = "eq14", b.modes = modes, b.modes_auto = false;
+  for (BodyScene& b : scene.bodies) b.structure = "eq14", b.modes = modes, b.modes_auto = false, b.shapes.clear();
   return scene;
 }
 

@@ -42,6 +42,7 @@ struct RunArguments {
   std::optional<double> duration, tolerance, output_step, vtu_step;
   std::optional<std::string> modes, structure, formulation, integrator;
   std::filesystem::path from;  // results folder or state file that the run goes on from
+  std::filesystem::path plan;  // results folder or scene file that the models of bodies are taken from
   bool force = false;          // from a state file that was changed by hand, too
   double checkpoint = 10;      // wall time between two checkpoints [s]
   bool report = false;

@@ -32,7 +32,9 @@ double peak_memory_mb() {
 
 /// Points of the mesh and every shape as a field of displacement over them. Beams are drawn along their deformed axis.
 VtkGrid shapes_grid(const BoundedModes& m) {
-  const auto& [model, assembly, basis] = std::tie(m.model, m.assembly, m.basis);
+  const Model& model = m.model;
+  const Assembly& assembly = m.assembly;
+  const ModalBasis& basis = m.basis;
   const auto is_beam = [](const Element& e) { return type_of(e).shape == Shape::line; };
   const auto field_name = [&basis](int k) {
     return fmt::format("mode_{:03d}_{}", k + 1, name_of(basis.kind[static_cast<size_t>(k)]));

@@ -93,7 +93,22 @@ void override_modes(Scene& scene, const std::string& text) {
   for (BodyScene& b : scene.bodies) {
     if (!b.is_boom()) continue;
     b.modes_auto = text == "auto";
+    b.shapes.clear();
     if (!b.modes_auto) b.modes = n;
+  }
+}
+
+/// Bodies get the modes, elements and stiffening that they have in another scene of the same bodies.
+void take_plan(Scene& scene, const std::filesystem::path& from) {
+  const Scene planned = load_scene((std::filesystem::is_directory(from) ? from / "scene.toml" : from).string());
+  for (BodyScene& b : scene.bodies) {
+    if (!b.is_boom()) continue;
+    const auto p = std::ranges::find(planned.bodies, b.name, &BodyScene::name);
+    require(p != planned.bodies.end() && p->is_boom(),
+            fmt::format("--plan: {} has no boom \"{}\"", from.string(), b.name));
+    b.structure = p->structure, b.stiffening = p->stiffening, b.solid = p->solid, b.geometry.order = p->geometry.order;
+    b.modes = p->modes, b.shapes = p->shapes, b.directions = p->directions;
+    b.modes_auto = p->modes_auto, b.directions_given = p->directions_given;
   }
 }
 
@@ -118,10 +133,12 @@ void go_on(Scene& scene, const RunArguments& a) {
                       saved->file().string(), saved->time(), scene.duration));
   for (BodyScene& b : scene.bodies) {
     const auto modes = saved->modes().find(b.name);
-    if ((!std::exchange(b.modes_auto, false) && a.modes.has_value()) || !b.is_elastic() ||
-        modes == saved->modes().end())
-      continue;
+    const bool planned = std::exchange(b.modes_auto, false);
+    if ((!planned && a.modes.has_value()) || !b.is_elastic() || modes == saved->modes().end()) continue;
     b.modes = modes->second;
+    if (planned) b.open_directions();
+    const auto shapes = saved->shapes().find(b.name);
+    b.shapes = shapes == saved->shapes().end() ? std::vector<int>() : shapes->second;
   }
   scene.from = std::move(saved);
 }
@@ -137,6 +154,7 @@ Scene scene_of(const RunArguments& a) {
   if (a.vtu_step) scene.vtu_step = *a.vtu_step;
   if (a.integrator) scene.integrator = *a.integrator;
   if (a.formulation) scene.formulation = *a.formulation;
+  if (!a.plan.empty()) take_plan(scene, a.plan);
   if (a.modes) override_modes(scene, *a.modes);
   if (a.structure)
     for (BodyScene& b : scene.bodies)

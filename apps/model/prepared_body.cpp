@@ -7,6 +7,7 @@
 #include "apps/model/reduction.hpp"
 #include "fem/base/check.hpp"
 #include "fem/booms/solid_boom.hpp"
+#include "reduction/basis/mode_selection.hpp"
 #include "reduction/body_file/body_file.hpp"
 #include "reduction/body_file/sha256.hpp"
 #include "reduction/invariants/eq14.hpp"
@@ -17,6 +18,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace flexboom {
 
@@ -113,10 +115,15 @@ PreparedBody prepare_model(const BodyScene& b, int refine) {
   return r;
 }
 
+/// A body with all its shapes.
+std::string all_that_makes(BodyScene b, int refine) {
+  b.shapes.clear();
+  return fmt::format("{}\nrefined {}\nflexboom {}\n", to_toml(b), refine, version);
+}
+
 /// Where a body is kept: its name, and a digest of all that it is made of.
 std::filesystem::path kept_file(const BodyScene& b, int refine, const std::filesystem::path& keep) {
-  const std::string made_of = fmt::format("{}\nrefined {}\nflexboom {}\n", to_toml(b), refine, version);
-  return keep / fmt::format("{}-{}.h5", b.name, sha256(made_of).substr(0, 16));
+  return keep / fmt::format("{}-{}.h5", b.name, sha256(all_that_makes(b, refine)).substr(0, 16));
 }
 
 std::optional<PreparedBody> read_kept(const std::filesystem::path& file) {
@@ -150,7 +157,9 @@ Mesh mesh_of(const BodyScene& b, int refine) {
   return b.structure == "solid" ? solid_mesh(b, refine) : beam_mesh(b.geometry, refine);
 }
 
-PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem::path& keep) {
+namespace {
+
+PreparedBody with_all_shapes(const BodyScene& b, int refine, const std::filesystem::path& keep) {
   if (b.rigid) return prepare_rigid(b);
   if (b.reduced) return prepare_reduced(b);
   require(b.structure == "eq14" || b.structure == "beam" || b.structure == "solid" || b.structure == "rigid",
@@ -169,6 +178,34 @@ PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem:
                                        c.name, c.value, c.reference));
   if (!file.empty()) write_kept(file, r), r.kept = file;
   return r;
+}
+
+PreparedBody with_shapes(PreparedBody p, const BodyScene& b) {
+  if (b.shapes.empty() || b.structure == "rigid") return p;
+  std::vector<int> list;
+  for (const int k : b.shapes) list.push_back(k - 1);
+  p.body = selected(p.body, list);
+  p.shapes = b.shapes;
+  return p;
+}
+
+}  // namespace
+
+PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem::path& keep) {
+  return with_shapes(with_all_shapes(b, refine, keep), b);
+}
+
+PreparedBody PreparedBodies::get(const BodyScene& b, int refine, const std::filesystem::path& keep) {
+  if (!b.is_boom()) return prepare_body(b, refine, keep);
+  constexpr size_t most = 200;  // bodies that vary are met once: what they take of the memory must end
+  const std::string made_of = all_that_makes(b, refine);
+  auto found = whole_.find(made_of);
+  if (found == whole_.end()) {
+    PreparedBody made = with_all_shapes(b, refine, keep);
+    if (whole_.size() >= most) whole_.clear();
+    found = whole_.emplace(made_of, std::move(made)).first;
+  }
+  return with_shapes(found->second, b);
 }
 
 }  // namespace flexboom

@@ -4,6 +4,7 @@
 #include "reduction/body/reduced_body.hpp"
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@ struct PreparedBody {
   int elements = 0;                // 0 where it was read from a file or is in closed form
   int dofs = 0;                    // unknowns of the model, 0 in closed form
   int modes = 0;                   // as BodyScene::modes; other bases have other numbers of coordinates
+  std::vector<int> shapes;         // as BodyScene::shapes
   std::vector<BodyCheck> checks;   // empty in closed form
   std::vector<std::string> notes;  // what the basis has to say
   std::filesystem::path kept;      // the file that later runs read it from; empty: none
@@ -28,5 +30,15 @@ Mesh mesh_of(const BodyScene&, int refine = 0);
 /// `refine` raises the polynomial order, for error estimates. A solid body is kept in the folder `keep`, if one is
 /// given, and read from there as long as what it is made of is the same. @throws InputError, NumericalError.
 PreparedBody prepare_body(const BodyScene&, int refine = 0, const std::filesystem::path& keep = {});
+
+/// Bodies that were made, for runs with equal ones. They are told apart by all that they are made of.
+class PreparedBodies {
+ public:
+  /// As prepare_body.
+  PreparedBody get(const BodyScene&, int refine = 0, const std::filesystem::path& keep = {});
+
+ private:
+  std::map<std::string, PreparedBody> whole_;  // with all shapes
+};
 
 }  // namespace flexboom

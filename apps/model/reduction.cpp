@@ -193,6 +193,8 @@ ReductionOptions reduction_options(const ReduceArguments& a, const Model& model)
   check_options(a, o.basis);
   o.clamp_beside = a.options.clamp.has_value();
   o.select = a.select;
+  if (const bool of_file = !a.select && !a.count && !a.basis; of_file && model.body && !model.body->shapes.empty())
+    o.select = fmt::format("list:{}", fmt::join(model.body->shapes, ","));
   o.damping = a.damping ? parse_damping(*a.damping) : model.damping;
   o.stiffening = a.stiffening;
   o.loads_at = a.loads_at;

@@ -126,6 +126,15 @@ int unknowns_in_hinge_plane(const Mesh& mesh, const std::vector<int>& clamp) {
   return count;
 }
 
+void check_shapes(Faults& faults, const std::string& path, const BodyScene& body) {
+  if (body.shapes.empty()) return;
+  if (body.modes_auto) return faults.add(join(path, "shapes"), R"(does not go with modes = "auto"; leave one out)");
+  if (body.basis.name != "clamped")
+    return faults.add(join(path, "shapes"), R"(is for basis = "clamped"; other bases are whole)");
+  if (body.shapes.back() > body.modes)
+    faults.add(join(path, "shapes"), fmt::format("has {}, but modes = {}", body.shapes.back(), body.modes));
+}
+
 void check_mode_count(Faults& faults, const std::string& path, const BodyScene& body) {
   // Every element brings more than one unknown; that spares the mesh and the assembly.
   long elements = 0;
@@ -154,6 +163,7 @@ void check_model(Faults& faults, const std::string& path, const BodyScene& body)
       section_of(segment.start, segment.material.nu, rule);
       section_of(segment.end, segment.material.nu, rule);
     }
+    check_shapes(faults, path, body);
     if (body.structure == "beam" && body.basis.name == "clamped" && !body.modes_auto)
       check_mode_count(faults, path, body);
     if (body.structure == "solid") chosen(body.geometry, body.solid);

@@ -40,7 +40,9 @@ struct BodyScene {
   int modes = 2;                           // elastic coordinates kept
   bool modes_given = false;                // by the file
   bool modes_auto = false;                 // modes = "auto": chosen from the accuracy wanted
+  std::vector<int> shapes;                 // which of the modes stand for the body, from 1; empty: all
   std::string directions = "hinge-plane";  // modes that count: "hinge-plane" (bending along y) or "all"
+  bool directions_given = false;           // by the file
   BasisOptions basis;                      // its names and places; modes, plane and backend are those of the body
   BeamGeometry geometry;
   SolidOptions solid;            // [solid], how structure = "solid" is meshed
@@ -52,6 +54,10 @@ struct BodyScene {
   std::optional<RigidScene> rigid;             // instead of a geometry; structure is "rigid"
   std::shared_ptr<const ReducedBody> reduced;  // instead of a geometry; structure is that of the file
   std::filesystem::path reduced_file;          // where `reduced` is from, absolute
+  /// Modes of all directions count, unless the file says which.
+  void open_directions() {
+    if (!directions_given) directions = "all";
+  }
   bool is_boom() const { return !rigid && !reduced; }
   bool is_elastic() const;  // has it coordinates, as far as that is known before it is made?
   bool root_moves() const;  // in its own frame: the root is then a marker, not a point of the frame

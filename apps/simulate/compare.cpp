@@ -21,6 +21,7 @@ namespace {
 BodyScene with_model(BodyScene b, BeamTheory theory, bool rotary_inertia) {
   b.structure = "beam";
   b.directions = "hinge-plane";
+  b.shapes.clear();
   b.geometry.theory = theory;
   b.geometry.rotary_inertia = rotary_inertia;
   return b;

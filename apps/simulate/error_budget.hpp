@@ -25,8 +25,4 @@ OutputTable without_coordinates(const OutputTable&);
 /// What the outputs of a scene with these bodies must bear.
 OutputFloors floors_of(const Scene&, const std::vector<PreparedBody>&);
 
-/// Sets the number of modes of every body that leaves it to the program: the first for which one more changes the
-/// outputs wanted by less than the tolerance.
-void choose_modes(Scene&, const RunHooks&, std::vector<std::string>& plan);
-
 }  // namespace flexboom

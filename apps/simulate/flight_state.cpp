@@ -117,6 +117,8 @@ std::string to_toml(const FlightState& state, const std::string& scene) {
   out.key("time", state.time, "[s]");
   out.table("[modes]");
   for (const auto& [body, n] : state.modes) out.key(toml(body), n);
+  if (!state.shapes.empty()) out.table("[shapes]");
+  for (const auto& [body, list] : state.shapes) out.key(toml(body), list);
   out.table("[largest]");
   out.key("energy", state.largest.energy, "[J], of the whole run: what its balances are relative to");
   out.key("momentum", state.largest.momentum, "[N s]");
@@ -148,6 +150,7 @@ struct SavedState::Content {
   Value root;
   double time = 0;
   std::map<std::string, int> modes;
+  std::map<std::string, std::vector<int>> shapes;
   std::map<std::string, StopHistory> stops;
   MotionScales largest;
   std::map<std::string, double> loops;
@@ -228,6 +231,13 @@ SavedState SavedState::read(const fs::path& path, bool changed_too) {
       content->modes[body] = modes->integer(body);
       if (content->modes[body] < 0) modes->fault(body, "must be a number of modes");
     }
+  if (std::optional<TableReader> shapes = table.table("shapes"))
+    for (const auto& [body, value] : shapes->value().entries)
+      for (const double k : shapes->numbers(body)) {
+        content->shapes[body].push_back(static_cast<int>(k));
+        if (!(k >= 1 && k <= content->modes[body] && k == std::floor(k)))
+          shapes->fault(body, "must be numbers of modes");
+      }
   table.table("state", true);
   if (std::optional<TableReader> largest = table.table("largest", true)) {
     MotionScales& l = content->largest;
@@ -265,6 +275,7 @@ SavedState::SavedState(SavedState&&) noexcept = default;
 const fs::path& SavedState::file() const { return content_->file; }
 double SavedState::time() const { return content_->time; }
 const std::map<std::string, int>& SavedState::modes() const { return content_->modes; }
+const std::map<std::string, std::vector<int>>& SavedState::shapes() const { return content_->shapes; }
 const MotionScales& SavedState::largest() const { return content_->largest; }
 
 VectorXd SavedState::values(const std::vector<std::string>& names) const {

@@ -18,11 +18,12 @@ namespace flexboom {
 struct FlightState {
   double time = 0;  // [s]
   std::vector<std::string> names;
-  Eigen::VectorXd y;                         // by names
-  std::map<std::string, int> modes;          // by body
-  std::map<std::string, StopHistory> stops;  // by hinge or joint
-  MotionScales largest;                      // by which balances are judged
-  std::map<std::string, double> loops;       // angles of hinges that close loops [rad]: which turn they are in
+  Eigen::VectorXd y;                               // by names
+  std::map<std::string, int> modes;                // by body
+  std::map<std::string, std::vector<int>> shapes;  // by body, of those that some of the modes stand for (BodyScene)
+  std::map<std::string, StopHistory> stops;        // by hinge or joint
+  MotionScales largest;                            // by which balances are judged
+  std::map<std::string, double> loops;             // angles of hinges that close loops [rad]: which turn they are in
 };
 
 /// Names of the states of a tree, in the order of its layout.
@@ -43,6 +44,7 @@ class SavedState {
   const std::filesystem::path& file() const;
   double time() const;
   const std::map<std::string, int>& modes() const;
+  const std::map<std::string, std::vector<int>>& shapes() const;
   const MotionScales& largest() const;
 
   /// The numbers of these names. @throws InputError naming each that is missing, not finite or too many.

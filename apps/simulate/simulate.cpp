@@ -3,6 +3,7 @@
 #include "apps/base/deflection.hpp"
 #include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/multipliers_flight.hpp"
+#include "apps/simulate/planner.hpp"
 #include "apps/simulate/tree_flight.hpp"
 #include "apps/simulate/verify.hpp"
 #include "dynamics/numerics/rotation.hpp"
@@ -47,7 +48,10 @@ FlightState end_of(const std::vector<PreparedBody>& bodies, double time, const V
   end.time = time;
   end.y = y;
   end.largest = largest;
-  for (const PreparedBody& p : bodies) end.modes[p.body.name] = p.modes;
+  for (const PreparedBody& p : bodies) {
+    end.modes[p.body.name] = p.modes;
+    if (!p.shapes.empty()) end.shapes[p.body.name] = p.shapes;
+  }
   return end;
 }
 
@@ -106,11 +110,15 @@ double largest_rate(const Run& run, size_t body) {
   return most;
 }
 
+PreparedBody prepared(const BodyScene& b, int refine, const std::filesystem::path& keep, const RunHooks& hooks) {
+  return hooks.bodies != nullptr ? hooks.bodies->get(b, refine, keep) : prepare_body(b, refine, keep);
+}
+
 Run run_once(const Scene& given, const RunHooks& hooks, int refine, long max_steps) {
   const Stopwatch start;
   const Scene scene = with_joints(given);
   std::vector<PreparedBody> bodies;
-  for (const BodyScene& b : scene.bodies) bodies.push_back(prepare_body(b, refine, scene.bodies_kept_in));
+  for (const BodyScene& b : scene.bodies) bodies.push_back(prepared(b, refine, scene.bodies_kept_in, hooks));
   const double seconds = start.seconds();
   const auto fly = scene.formulation == "multipliers" ? fly_by_multipliers : fly_tree;
   Run r = fly(scene, std::move(bodies), hooks, max_steps);
@@ -220,12 +228,16 @@ bool is_balanced(const IntegrationSummary& s) {
   return s.energy_balance <= broken && !(s.momentum_drift > broken);  // which may be unknown
 }
 
-RunResult run_scene(const Scene& given, const RunHooks& hooks,
+RunResult run_scene(const Scene& given, const RunHooks& asked,
                     const std::function<void(const RunResult& so_far, size_t first)>& so_far) {
+  PreparedBodies made;
+  RunHooks hooks = asked;
+  if (hooks.bodies == nullptr) hooks.bodies = &made;
   RunResult r;
   r.scene = given;
   validate(r.scene);
-  choose_modes(r.scene, hooks, r.plan);
+  Planner planner(r.scene);
+  planner.choose(r.scene, hooks, r.plan);
   RunHooks of_run = hooks;
   if (so_far)
     of_run.checkpoint = [&](Run run, size_t first) {
@@ -237,18 +249,25 @@ RunResult run_scene(const Scene& given, const RunHooks& hooks,
       so_far(part, first);
     };
   Run run = run_once(r.scene, of_run);
-  add_words(run, r);
+  std::vector<std::string> words;  // of the budget
   // The repeats cost many times the run; a long one is not repeated.
   constexpr long worth_repeating = 2'000'000;
   const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating;
   if (r.scene.error_budget && !repeat)
-    r.plan.push_back(fmt::format("error budget: not measured, its repeats would cost many times {} evaluations",
-                                 run.motion.summary.rhs_evaluations));
+    words.push_back(fmt::format("error budget: not measured, its repeats would cost many times {} evaluations",
+                                run.motion.summary.rhs_evaluations));
   if (r.scene.error_budget && repeat && !run.motion.summary.interrupted) {
     const Stopwatch start;
-    r.budget = measure_budget(r.scene, run, hooks, r.plan);
+    r.budget = measure_budget(r.scene, run, hooks, words);
+    while (planner.improve(r.scene, r.budget, hooks, r.plan)) {
+      run = run_once(r.scene, of_run);
+      words.clear();
+      r.budget = measure_budget(r.scene, run, hooks, words);
+    }
     r.budget_seconds = start.seconds();
   }
+  add_words(run, r);
+  r.plan.insert(r.plan.end(), words.begin(), words.end());
   add_warnings(run, r);
   take(std::move(run), r);
   if (r.scene.verify && !r.trajectory.summary.interrupted) r.checks = reference_checks(r, hooks);

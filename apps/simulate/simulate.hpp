@@ -44,10 +44,12 @@ struct RunResult {
 
 struct Run;
 
+/// Beside a run.
 struct RunHooks {
   const std::atomic<bool>* interrupt = nullptr;
   std::function<void(double time, double duration)> progress{};
-  double checkpoint_every = 10;  // wall time between two checkpoints [s]
+  double checkpoint_every = 10;      // wall time between two checkpoints [s]
+  PreparedBodies* bodies = nullptr;  // that other runs have made; nullptr: this one makes its own
   /// Told at every checkpoint of a flight: the run so far, whose rows begin with row `first` of the flight. Its end is
   /// the state there. Row 0 comes again where the flight begins anew.
   std::function<void(Run so_far, size_t first)> checkpoint{};
@@ -92,6 +94,9 @@ IntegratorOptions integrator_options(const Scene&, const RunHooks&, std::string_
 
 /// The largest angular velocity of a body's frame in a flight [rad/s].
 double largest_rate(const Run&, size_t body);
+
+/// prepare_body, or what other runs have made.
+PreparedBody prepared(const BodyScene&, int refine, const std::filesystem::path& keep, const RunHooks&);
 
 /// `max_steps` > 0 bounds its cost: NumericalError above.
 Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);

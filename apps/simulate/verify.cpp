@@ -55,7 +55,7 @@ std::vector<ReferenceCheck> reference_checks(const RunResult& r, const RunHooks&
   scene.tolerance = std::max(1e-12, std::min(scene.tolerance / 100, 1e-9));  // its own error of time is none
   OutputFloors floors = floors_of(r.scene, r.bodies);
   RunHooks quiet;
-  quiet.interrupt = hooks.interrupt;
+  quiet.interrupt = hooks.interrupt, quiet.bodies = hooks.bodies;
   std::vector<ReferenceCheck> checks;
   for (const Reference& reference : references(scene, r.trajectory.summary.method)) {
     if (hooks.interrupt != nullptr && hooks.interrupt->load()) break;

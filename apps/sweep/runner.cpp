@@ -2,6 +2,7 @@
 
 #include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/multipliers_flight.hpp"
+#include "apps/simulate/planner.hpp"
 #include "apps/simulate/tree_flight.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
@@ -22,12 +23,12 @@ SweepRunner::SweepRunner(SceneSource source, SweepValues values, bool loads, boo
       keep_trajectories_(keep_trajectories),
       scene_(source_.read()) {
   std::vector<std::string> plan;
-  choose_modes(scene_, {}, plan);
+  Planner(scene_).choose(scene_, {}, plan);
   set_options(scene_);
   scene_.bodies_kept_in = source_.bodies_kept_in();
   validate(scene_);
   for (const BodyScene& b : with_joints(scene_).bodies)
-    if (b.is_boom()) bodies_.emplace(to_toml(b), prepare_body(b, 0, scene_.bodies_kept_in));
+    if (b.is_boom()) bodies_.get(b, 0, scene_.bodies_kept_in);
   note_columns(scene_);
 }
 
@@ -50,7 +51,10 @@ void SweepRunner::note_columns(Scene scene) {
 /// What the command line asks of every run, and what was chosen once for all of them.
 void SweepRunner::set_options(Scene& scene) const {
   for (size_t i = 0; i < scene.bodies.size(); ++i)
-    if (std::exchange(scene.bodies[i].modes_auto, false)) scene.bodies[i].modes = scene_.bodies[i].modes;
+    if (BodyScene& b = scene.bodies[i]; std::exchange(b.modes_auto, false)) {
+      b.modes = scene_.bodies[i].modes, b.shapes = scene_.bodies[i].shapes;
+      b.open_directions();
+    }
   if (loads_) ask_for_loads(scene);
 }
 
@@ -60,20 +64,10 @@ Scene SweepRunner::scene_of_run(size_t run) const {
   return scene;
 }
 
-PreparedBody SweepRunner::prepared(const BodyScene& b) {
-  if (!b.is_boom()) return prepare_body(b);
-  constexpr size_t most = 200;  // bodies that vary are met once: what they take of the memory must end
-  std::string made_of = to_toml(b);
-  const auto found = bodies_.find(made_of);
-  if (found != bodies_.end()) return found->second;
-  if (bodies_.size() >= most) bodies_.clear();
-  return bodies_.emplace(std::move(made_of), prepare_body(b)).first->second;
-}
-
 Run SweepRunner::simulate(const Scene& given) {
   const Scene scene = with_joints(given);
   std::vector<PreparedBody> bodies;
-  for (const BodyScene& b : scene.bodies) bodies.push_back(prepared(b));
+  for (const BodyScene& b : scene.bodies) bodies.push_back(bodies_.get(b));
   const auto fly = scene.formulation == "multipliers" ? fly_by_multipliers : fly_tree;
   return fly(scene, std::move(bodies), {}, 0);
 }

@@ -48,7 +48,6 @@ class SweepRunner {
   Scene scene_of_run(size_t run) const;
   void set_options(Scene&) const;
   Run simulate(const Scene&);
-  PreparedBody prepared(const BodyScene&);
   void note_columns(Scene);
 
   SceneSource source_;
@@ -57,7 +56,7 @@ class SweepRunner {
   Scene scene_;
   std::vector<Quantity> quantities_;
   std::vector<std::string> columns_;
-  std::map<std::string, PreparedBody> bodies_;  // by all that they are made of
+  PreparedBodies bodies_;
 };
 
 }  // namespace flexboom

@@ -42,10 +42,6 @@ Scene with_reduced(const std::string& text, const std::function<void(ReducedBody
   return scene;
 }
 
-bool any_has(const std::vector<std::string>& lines, const std::string& words) {
-  return std::ranges::any_of(lines, [&](const std::string& l) { return l.find(words) != std::string::npos; });
-}
-
 class Budget : public testing::TestWithParam<std::string> {
  protected:
   RunResult run(Scene scene) const {

@@ -576,7 +576,7 @@ class RunFiles(Case):
     def test_modes_chosen_by_the_program(self):
         folder = self.run_sport("--duration", "0.02", "--tolerance", "1e-2", "--modes", "auto")
         self.assertTrue(all(b["modes"] >= 1 for b in self.summary(folder)["bodies"][:-1]))
-        self.assertTrue(any(line.startswith("modes:") for line in self.summary(folder)["plan"]))
+        self.assertTrue(any(line.startswith("modes of sip: ") for line in self.summary(folder)["plan"]))
 
     def test_same_run_same_bits(self):
         runs = [self.run_sport("--duration", "0.5", *extra, out=name)
@@ -973,6 +973,42 @@ class Solids(Case):
         self.modes(BOOM4, "--structure", "solid", "--accuracy", "1e-2", "--vtu", file)
         fields = meshio.read(file).point_data
         self.assertEqual(sum(name.startswith("mode_") for name in fields), 6)
+
+
+class Plan(Case):
+    """Modes that the program chooses."""
+
+    def run_of(self, name, *arguments):
+        out = self.folder / name
+        result = flexboom("run", "sport", "--duration", "0.3", "--tolerance", "1e-3", "--out", out, *arguments)
+        self.assert_exit(OK, result)
+        return json.loads((out / "summary.json").read_text()), (out / "trajectory.csv").read_text(), result.stdout
+
+    def test_a_plan_is_printed_kept_and_taken_again(self):
+        planned, rows, printed = self.run_of("first", "--modes", "auto")
+        self.assertTrue(planned["accuracy_met"])
+        self.assertIn("modes of sip: ", printed)
+        self.assertIn("that nothing moves", printed)
+        again, same_rows, printed = self.run_of("again", "--plan", self.folder / "first")
+        self.assertNotIn("that nothing moves", printed)
+        self.assertEqual([b["frequencies_hz"] for b in again["bodies"]], [b["frequencies_hz"] for b in planned["bodies"]])
+        self.assertEqual(rows, same_rows)
+
+    def test_a_planned_run_goes_on(self):
+        _, rows, _ = self.run_of("whole", "--modes", "auto", "--no-budget")
+        out = self.folder / "part"
+        self.assert_exit(OK, flexboom("run", "sport", "--duration", "0.2", "--tolerance", "1e-3", "--out", out,
+                                      "--plan", self.folder / "whole", "--no-budget"))
+        self.assertIn("[shapes]", (out / "state.toml").read_text())
+        result = flexboom("run", "sport", "--duration", "0.3", "--tolerance", "1e-3", "--out", self.folder / "rest",
+                          "--plan", self.folder / "whole", "--continue", out, "--no-budget")
+        self.assert_exit(OK, result)
+
+    def test_a_plan_of_other_bodies_is_refused(self):
+        self.run_of("sport", "--no-budget")
+        result = flexboom("run", "panel-slew", "--plan", self.folder / "sport", "--out", self.folder / "other")
+        self.assert_exit(INPUT, result)
+        self.assertIn('has no boom "panel"', result.stderr)
 
 
 class Bench(Case):

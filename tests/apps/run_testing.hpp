@@ -14,6 +14,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace flexboom {
 
@@ -38,6 +39,11 @@ inline SavedState state_of(const std::string& text, bool changed_too = false) {
 inline Scene going_on(Scene scene, const RunResult& from) {
   scene.from = std::make_shared<SavedState>(state_of(to_toml(from.end, scene.name)));
   return scene;
+}
+
+/// Does a line have these words?
+inline bool any_has(const std::vector<std::string>& lines, const std::string& words) {
+  return std::ranges::any_of(lines, [&](const std::string& l) { return l.find(words) != std::string::npos; });
 }
 
 inline Eigen::VectorXd column(const RunResult& r, const std::string& name) {

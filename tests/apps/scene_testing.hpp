@@ -105,6 +105,7 @@ size = [0.1, 0.2, 0.3]
 name = "arm"
 stiffening = "on"
 modes = 2
+shapes = [1, 2]
 [[bodies.segments]]
 shape = "tube"
 diameter = 0.02

@@ -1,0 +1,218 @@
+// The model of a scene that leaves it to the program: runs with fewer modes beside one with many.
+
+#include "apps/simulate/planner.hpp"
+
+#include "apps/base/deflection.hpp"
+#include "apps/simulate/error_budget.hpp"
+#include "fem/base/check.hpp"
+#include "fem/booms/solid_boom.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace flexboom {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double unmoved = 1e-10;  // of the largest displacement: round-off of one that is zero
+constexpr int fewest = 4;          // candidates per body
+constexpr int most_trials = 6;     // runs with fewer modes
+constexpr int most_steps = 3;      // improvements
+
+bool stopped(const RunHooks& hooks) { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
+
+/// With as many modes as the elements have, `wanted` at most.
+BodyScene with_modes(BodyScene b, int wanted, const std::filesystem::path& keep, const RunHooks& hooks) {
+  b.shapes.clear();
+  for (b.modes = wanted; b.modes > 2; b.modes -= 2) {
+    try {
+      prepared(b, 0, keep, hooks);
+      break;
+    } catch (const InputError&) {  // that is another fault where two modes have it, too
+    }
+  }
+  return b;
+}
+
+/// The largest |q| of every coordinate of a body.
+VectorXd amplitudes(const Run& run, const ReducedBody& body) {
+  const auto first = std::ranges::find(run.outputs.names, body.name + ".q1") - run.outputs.names.begin();
+  return run.outputs.values.middleCols(first, body.n()).cwiseAbs().colwise().maxCoeff().transpose();
+}
+
+/// "bending_y 2, torsion 1" of kinds.
+std::string counted(const std::vector<std::string>& kinds) {
+  std::map<std::string, int> count;
+  for (const std::string& kind : kinds) ++count[kind];
+  std::vector<std::string> parts;
+  for (const auto& [kind, n] : count) parts.push_back(fmt::format("{} {}", n, kind));
+  return parts.empty() ? "none" : fmt::format("{}", fmt::join(parts, ", "));
+}
+
+}  // namespace
+
+Planner::Planner(const Scene& scene) {
+  for (size_t i = 0; i < scene.bodies.size(); ++i)
+    if (scene.bodies[i].modes_auto && scene.bodies[i].structure != "rigid") open_.push_back(i);
+}
+
+Scene Planner::with_candidates(const Scene& scene, int candidates, const RunHooks& hooks) const {
+  Scene all = scene;
+  for (const size_t i : open_) {
+    BodyScene& b = all.bodies[i];
+    b.modes_auto = false;
+    b.open_directions();
+    if (b.stiffening.empty() && b.structure != "eq14") b.stiffening = "auto";
+    const int wanted = b.directions == "all" ? candidates : candidates / 2;
+    b = with_modes(b, wanted, scene.bodies_kept_in, hooks);
+  }
+  return all;
+}
+
+/// Only clamped modes are independent of each other; other bases are whole.
+bool Planner::has_choice(const Scene& scene, const std::string& body) const {
+  return std::ranges::any_of(
+      open_, [&](size_t i) { return scene.bodies[i].name == body && scene.bodies[i].basis.name == "clamped"; });
+}
+
+/// The largest displacement first.
+std::vector<Planner::Candidate> Planner::ranked(const Scene& scene, const Run& run) const {
+  std::vector<Candidate> list;
+  for (const PreparedBody& p : run.bodies) {
+    if (p.body.n() == 0 || !has_choice(scene, p.body.name)) continue;
+    const Deflection deflection(p.body);
+    const VectorXd q = amplitudes(run, p.body);
+    for (int k = 0; k < p.body.n(); ++k)
+      list.push_back({p.body.name, k + 1, p.body.coordinates[static_cast<size_t>(k)].kind,
+                      deflection.largest(q[k] * VectorXd::Unit(p.body.n(), k))});
+  }
+  std::ranges::stable_sort(list, std::greater(), &Candidate::displacement);
+  return list;
+}
+
+Scene Planner::with_first(const Scene& all, const std::vector<Candidate>& list, size_t count) const {
+  Scene scene = all;
+  for (const size_t i : open_) {
+    BodyScene& b = scene.bodies[i];
+    if (!has_choice(all, b.name)) continue;
+    b.shapes.clear();
+    for (size_t k = 0; k < count; ++k)
+      if (list[k].body == b.name) b.shapes.push_back(list[k].shape);
+    std::ranges::sort(b.shapes);
+    if (b.shapes.empty()) b.modes = 0;
+  }
+  return scene;
+}
+
+Run Planner::with_all(const Scene& scene, const RunHooks& hooks, Scene& open, Scene& all,
+                      std::vector<std::string>& plan) {
+  const auto run = [&](int candidates, long max_steps) {
+    open = with_candidates(scene, candidates, hooks);
+    all = with_stiffening(open);
+    all.tolerance = std::max(scene.tolerance / 10, 1e-13);  // its errors are no part of the differences
+    return run_once(all, hooks, 0, max_steps);
+  };
+  const Run few = run(fewest, 0);
+  const long bearable = 20 * few.motion.summary.steps + 10000;
+  for (; candidates_ > fewest && !stopped(hooks); candidates_ /= 2) {
+    try {
+      return run(candidates_, bearable);
+    } catch (const NumericalError&) {
+      costly_ = true;
+      plan.push_back(
+          fmt::format("modes: a run with {} of each body fails or takes more than {} steps", candidates_, bearable));
+    }
+  }
+  return run(fewest, 0);
+}
+
+void Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
+  if (open_.empty()) return;
+  Scene open, all;
+  const Run reference = with_all(scene, hooks, open, all, plan);
+  const OutputTable wanted = without_coordinates(reference.outputs);
+  const OutputFloors floors = floors_of(scene, reference.bodies);
+  const std::vector<Candidate> list = ranked(all, reference);
+  const auto moving_by = [&](double share) {
+    return static_cast<size_t>(std::ranges::count_if(
+        list, [&](const Candidate& c) { return c.displacement > share * list.front().displacement; }));
+  };
+  const auto error_with = [&](size_t count) {
+    try {
+      const long bearable = 20 * reference.motion.summary.steps + 10000;
+      const Run run = run_once(with_first(all, list, count), hooks, 0, bearable);
+      return largest(compare_outputs(without_coordinates(run.outputs), wanted, scene.outputs, floors));
+    } catch (const NumericalError&) {
+      return unknown;
+    }
+  };
+  const size_t moved = moving_by(unmoved);
+  size_t enough = moved, too_few = 0, next = moving_by(scene.tolerance / 10);
+  double error = 0;
+  for (int i = 0; i < most_trials && enough > too_few && !stopped(hooks); ++i) {
+    const double e = error_with(std::min(next, enough - 1));
+    if (e <= scene.tolerance / 3)
+      enough = std::min(next, enough - 1), error = e;
+    else
+      too_few = std::min(next, enough - 1) + 1;
+    next = (enough + too_few) / 2;
+  }
+  const Scene chosen = with_first(open, list, enough);
+  for (const size_t i : open_) {
+    const BodyScene& b = scene.bodies[i] = chosen.bodies[i];
+    if (!has_choice(all, b.name)) {
+      plan.push_back(
+          fmt::format("{}: {} modes; the basis \"{}\" has no choice of them", b.name, b.modes, b.basis.name));
+      continue;
+    }
+    std::vector<std::string> taken, small, still;
+    for (size_t k = 0; k < list.size(); ++k)
+      if (list[k].body == b.name) (k < enough ? taken : k < moved ? small : still).push_back(list[k].kind);
+    plan.push_back(fmt::format(
+        "modes of {}: {}, of {} modes; left out: {} that nothing moves, {} that change the outputs "
+        "by {:.1e} together with those of all bodies",
+        b.name, counted(taken), taken.size() + small.size() + still.size(), counted(still), counted(small), error));
+  }
+}
+
+bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {
+  const OutputErrors* worst = budget.worst();
+  if (open_.empty() || !budget.measured || budget.within(scene.tolerance) || worst == nullptr || stopped(hooks) ||
+      steps_++ >= most_steps)
+    return false;
+  const double others = std::max(worst->time, worst->linearisation);
+  if (std::max(worst->truncation, worst->discretisation) <= others) return false;
+  if (worst->truncation >= worst->discretisation) {
+    const double before = std::exchange(truncation_, worst->truncation);
+    constexpr double far = 100;
+    if (costly_ || (truncation_ > far * scene.tolerance && truncation_ > before / 2)) return false;
+    candidates_ *= 2;
+    plan.push_back(fmt::format("truncation: {:.1e} in {}; modes are chosen again, from {} of each body",
+                               worst->truncation, worst->name, candidates_));
+    const Scene fewer = scene;
+    for (const size_t i : open_) scene.bodies[i].modes_auto = true;
+    choose(scene, hooks, plan);
+    if (stopped(hooks)) scene = fewer;
+    return !stopped(hooks);
+  }
+  plan.push_back(
+      fmt::format("discretisation: {:.1e} in {}; elements of two orders more", worst->discretisation, worst->name));
+  for (const size_t i : open_) {
+    BodyScene& b = scene.bodies[i];
+    constexpr int highest = 12;
+    if (b.structure == "beam") b.geometry.order = std::min(b.geometry.order + 2, highest);
+    if (b.structure == "solid")
+      if (const auto finer = refined(chosen(b.geometry, b.solid), 2)) b.solid = *finer;
+  }
+  return true;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,50 @@
+#pragma once
+
+#include "apps/simulate/simulate.hpp"
+
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// Chooses what stands for the bodies with modes = "auto": which of their modes, of which elements. The outputs wanted
+/// decide: those of a run with many modes (the candidates) must change by no more than a third of the tolerance.
+class Planner {
+ public:
+  explicit Planner(const Scene&);
+
+  /// Candidates that no motion reaches are left out; of the others, the fewest that move most and are enough.
+  /// Afterwards no body of the scene is left open. `plan` gets one line per body.
+  /// @throws InputError, NumericalError as run_once, of the candidates.
+  void choose(Scene&, const RunHooks&, std::vector<std::string>& plan);
+
+  /// A better model where the largest part of the budget's worst output is truncation (twice the candidates) or
+  /// discretisation (finer elements). False: the budget is met, or what stops it is not for a plan to mend: another
+  /// part, or a truncation that more modes hardly change.
+  bool improve(Scene&, const ErrorBudget&, const RunHooks&, std::vector<std::string>& plan);
+
+ private:
+  /// A mode of a body.
+  struct Candidate {
+    std::string body;
+    int shape = 0;  // as BodyScene::shapes
+    std::string kind;
+    double displacement = 0;  // the largest of any point at any time [m]
+  };
+
+  Scene with_candidates(const Scene&, int candidates, const RunHooks&) const;
+  /// The run that the others are compared with, as precise as that takes: as many candidates as are bearable. `open`
+  /// has them and leaves stiffening as it was, `all` is what was run.
+  Run with_all(const Scene&, const RunHooks&, Scene& open, Scene& all, std::vector<std::string>& plan);
+  bool has_choice(const Scene&, const std::string& body) const;
+  std::vector<Candidate> ranked(const Scene&, const Run&) const;
+  Scene with_first(const Scene& all, const std::vector<Candidate>&, size_t count) const;
+
+  std::vector<size_t> open_;     // bodies of the scene
+  int candidates_ = 12;          // per body
+  int steps_ = 0;                // improvements so far
+  bool costly_ = false;          // more candidates are not bearable
+  double truncation_ = unknown;  // of the last step
+};
+
+}  // namespace flexboom

@@ -1,0 +1,135 @@
+// What a scene with modes = "auto" is simulated with.
+
+#include "apps/simulate/planner.hpp"
+#include "fem/base/check.hpp"
+#include "tests/apps/run_testing.hpp"
+#include "tests/apps/scene_testing.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+namespace {
+
+/// A boom on a satellite that is spun up about the axis; z bends it in its x-y plane alone, y in its x-z plane alone.
+Scene spun_about(const std::string& axis, double tolerance, const std::string& modes = "\"auto\"") {
+  return parse_scene(fmt::format(R"(format = "flexboom-scene-1"
+name = "spun"
+duration = 2.0
+output_step = 0.02
+accuracy = {{ tolerance = {}, outputs = ["fly.rotation", "boom.tip"] }}
+[[bodies]]
+name = "hub"
+mass = 20.0
+inertia = [0.6, 0.6, 0.6]
+[[bodies]]
+name = "boom"
+modes = {}
+damping = {{ rule = "modal", value = 0.01 }}
+[[bodies.segments]]
+shape = "round-bar"
+diameter = 0.01
+length = 1.5
+material = {{ E = 67e9, nu = 0.33, rho = 2840.0 }}
+[[joints]]
+name = "fly"
+kind = "free"
+b = {{ body = "hub" }}
+[[joints]]
+name = "mount"
+kind = "fixed"
+a = {{ body = "hub", point = [0.1, 0.0, 0.0] }}
+b = {{ body = "boom", marker = "root" }}
+[[loads]]
+name = "thruster"
+at = {{ body = "hub" }}
+torque = {}
+)",
+                                 tolerance, modes, axis == "z" ? "[0.0, 0.0, 0.05]" : "[0.0, 0.05, 0.0]"),
+                     "spun.toml");
+}
+
+std::vector<std::string> kinds_of(const RunResult& r) {
+  std::vector<std::string> kinds;
+  for (const Coordinate& c : r.bodies.at(1).body.coordinates) kinds.push_back(c.kind);
+  std::ranges::sort(kinds);
+  kinds.erase(std::ranges::unique(kinds).begin(), kinds.end());
+  return kinds;
+}
+
+TEST(Planner, LeavesOutWhatNothingMoves) {
+  const RunResult about_z = run_scene(spun_about("z", 1e-4), {});
+  EXPECT_EQ(kinds_of(about_z), std::vector<std::string>{"bending_y"});
+  EXPECT_TRUE(any_has(about_z.plan, "bending_z")) << "the reason";
+  EXPECT_TRUE(any_has(about_z.plan, "that nothing moves"));
+  EXPECT_EQ(kinds_of(run_scene(spun_about("y", 1e-4), {})), std::vector<std::string>{"bending_z"});
+}
+
+// The reference has 24 modes and finer elements, and is a thousand times tighter.
+TEST(Planner, WhatIsSaidToBeMetIsMet) {
+  Scene full = spun_about("z", 1e-9, "24");
+  full.bodies[1].directions = "all";
+  full.bodies[1].stiffening = "on";
+  full.bodies[1].geometry.order = 8;
+  full.error_budget = false;
+  const OutputTable reference = run_scene(full, {}).outputs;
+  int before = 0;
+  for (const double tolerance : {1e-2, 1e-3, 1e-4, 1e-5}) {
+    const RunResult r = run_scene(spun_about("z", tolerance), {});
+    ASSERT_TRUE(r.budget.within(tolerance)) << tolerance;
+    EXPECT_LE(largest(compare_outputs(r.outputs, reference, r.scene.outputs)), tolerance);
+    EXPECT_GE(r.bodies.at(1).body.n(), before);
+    before = r.bodies.at(1).body.n();
+  }
+  EXPECT_GT(before, 1);
+}
+
+TEST(Planner, ARunGoesOnToBetterModelsUntilTheBudgetIsMet) {
+  Scene scene = spun_about("z", 1e-6);
+  scene.bodies[1].geometry.order = 1;  // elements that are too coarse
+  scene.bodies[1].geometry.segments[0].elements = 8;
+  const RunResult r = run_scene(scene, {});
+  EXPECT_TRUE(any_has(r.plan, "elements of two orders more"));
+  EXPECT_GT(r.scene.bodies[1].geometry.order, 1);
+  EXPECT_LT(r.budget.discretisation, 1e-2);
+}
+
+TEST(Planner, ThePlanIsPartOfTheSceneThatWasRun) {
+  const RunResult r = run_scene(spun_about("z", 1e-3), {});
+  EXPECT_FALSE(r.scene.bodies[1].modes_auto);
+  ASSERT_FALSE(r.scene.bodies[1].shapes.empty());
+  Scene again = parse_scene(to_toml(r.scene), "again.toml");
+  EXPECT_EQ(again.bodies[1].shapes, r.scene.bodies[1].shapes);
+  EXPECT_EQ(run_scene(again, {}).outputs.values, r.outputs.values);
+}
+
+TEST(Shapes, AreSomeOfTheModes) {
+  Scene scene = spun_about("z", 1e-4, "6\nshapes = [1, 4]");
+  const ReducedBody some = prepare_body(scene.bodies[1]).body;
+  scene.bodies[1].shapes.clear();
+  const ReducedBody all = prepare_body(scene.bodies[1]).body;
+  ASSERT_EQ(some.n(), 2);
+  EXPECT_EQ(some.Ke(1, 1), all.Ke(3, 3));
+  EXPECT_EQ(some.De(1, 1), all.De(3, 3));
+}
+
+TEST(Shapes, AreCheckedAgainstTheModes) {
+  const auto fault = [](const std::string& modes) -> std::string {
+    try {
+      validate(spun_about("z", 1e-4, modes));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(fault("3\nshapes = [1, 4]").find("shapes: has 4, but modes = 3"), std::string::npos);
+  EXPECT_NE(fault("3\nshapes = [2, 1]").find("shapes: has 1; it must be ascending"), std::string::npos);
+  EXPECT_NE(fault("\"auto\"\nshapes = [1]").find("shapes: does not go with modes = \"auto\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace flexboom
