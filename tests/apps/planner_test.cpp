@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -53,20 +54,18 @@ torque = {}
                      "spun.toml");
 }
 
-std::vector<std::string> kinds_of(const RunResult& r) {
-  std::vector<std::string> kinds;
-  for (const Coordinate& c : r.bodies.at(1).body.coordinates) kinds.push_back(c.kind);
-  std::ranges::sort(kinds);
-  kinds.erase(std::ranges::unique(kinds).begin(), kinds.end());
+std::set<std::string> kinds_of(const RunResult& r) {
+  std::set<std::string> kinds;
+  for (const Coordinate& c : r.bodies.at(1).body.coordinates) kinds.insert(c.kind);
   return kinds;
 }
 
 TEST(Planner, LeavesOutWhatNothingMoves) {
   const RunResult about_z = run_scene(spun_about("z", 1e-4), {});
-  EXPECT_EQ(kinds_of(about_z), std::vector<std::string>{"bending_y"});
+  EXPECT_EQ(kinds_of(about_z), std::set<std::string>{"bending_y"});
   EXPECT_TRUE(any_has(about_z.plan, "bending_z")) << "the reason";
   EXPECT_TRUE(any_has(about_z.plan, "that nothing moves"));
-  EXPECT_EQ(kinds_of(run_scene(spun_about("y", 1e-4), {})), std::vector<std::string>{"bending_z"});
+  EXPECT_EQ(kinds_of(run_scene(spun_about("y", 1e-4), {})), std::set<std::string>{"bending_z"});
 }
 
 // The reference has 24 modes and finer elements, and is a thousand times tighter.
