@@ -128,7 +128,8 @@ int unknowns_in_hinge_plane(const Mesh& mesh, const std::vector<int>& clamp) {
 
 void check_shapes(Faults& faults, const std::string& path, const BodyScene& body) {
   if (body.shapes.empty()) return;
-  if (body.modes_auto) return faults.add(join(path, "shapes"), R"(does not go with modes = "auto"; leave one out)");
+  if (body.modes_auto)
+    return faults.add(join(path, "shapes"), "are some of the modes; their number must stand in \"modes\" beside it");
   if (body.basis.name != "clamped")
     return faults.add(join(path, "shapes"), R"(is for basis = "clamped"; other bases are whole)");
   if (body.shapes.back() > body.modes)

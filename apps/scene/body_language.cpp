@@ -206,7 +206,7 @@ void model_keys(Archive& a, BodyScene& b) {
   a.choice({"structure", "", "model of the body"}, structures, b.structure);
   a.key({"clamp", "", R"(node set that is fixed: `"root"`, `"tip"` or the name of an attachment)"}, b.clamp);
   NumberOrWord modes{static_cast<double>(b.modes), b.modes_auto ? "auto" : "", true};
-  a.choice_or_number({"modes", "", "number of modes, 0 to 10000"}, mode_words, modes, mode_count);
+  a.choice_or_number({"modes", "", "number of modes, 0 to 10000", false, "`\"auto\"`"}, mode_words, modes, mode_count);
   std::vector<double> shapes(b.shapes.begin(), b.shapes.end());
   if (a.use() != Use::write || !shapes.empty())
     a.key({"shapes", "", "which of the modes stand for the body, counted from 1", false, "all"}, shapes, shape_numbers);
@@ -216,7 +216,8 @@ void model_keys(Archive& a, BodyScene& b) {
     b.directions_given = b.directions_given || reader->has("directions");
     b.shapes.assign(shapes.begin(), shapes.end());
   }
-  a.choice({"directions", "", "modes that count, bending along y or all"}, directions, b.directions);
+  if (a.use() != Use::write || b.directions_given || !b.modes_auto)  // a plan has those that are not given
+    a.choice({"directions", "", "modes that count, bending along y or all"}, directions, b.directions);
   basis_keys(a, b.basis);
   a.choice({"backend", "", "eigen-solver"}, backends, b.backend);
   a.table({"damping", "", "of the elastic coordinates", false, "none"}, b.damping, damping_keys, "Damping");
@@ -273,6 +274,7 @@ void body_keys(Archive& a, BodyScene& b) {
               "`\"auto\"`"},
              stiffenings, b.stiffening);
   model_keys(a, b);
+  if (reader && !b.modes_given && b.structure != "rigid") b.modes_auto = true;
   if (reader && b.structure == "rigid" && reader->has("modes"))
     reader->reading().warnings.push_back(reader->table().path("modes") + ": has no effect with structure = \"rigid\"");
   if (reader && reader->has("file")) return reader->hint(" (its geometry comes from the body file)");

@@ -106,6 +106,16 @@ TEST(Planner, ThePlanIsPartOfTheSceneThatWasRun) {
   EXPECT_EQ(run_scene(again, {}).outputs.values, r.outputs.values);
 }
 
+TEST(Planner, PlansWhatSaysNothingOfModes) {
+  std::string text = to_toml(spun_about("z", 1e-3));
+  const std::string key = "modes = \"auto\"";
+  ASSERT_NE(text.find(key), std::string::npos);
+  text.erase(text.find(key), key.size());
+  const RunResult r = run_scene(parse_scene(text, "silent.toml"), {});
+  EXPECT_EQ(r.scene.bodies[1].shapes, run_scene(spun_about("z", 1e-3), {}).scene.bodies[1].shapes);
+  EXPECT_FALSE(r.scene.bodies[1].shapes.empty());
+}
+
 TEST(Shapes, AreSomeOfTheModes) {
   Scene scene = spun_about("z", 1e-4, "6\nshapes = [1, 4]");
   const ReducedBody some = prepare_body(scene.bodies[1]).body;
@@ -127,7 +137,9 @@ TEST(Shapes, AreCheckedAgainstTheModes) {
   };
   EXPECT_NE(fault("3\nshapes = [1, 4]").find("shapes: has 4, but modes = 3"), std::string::npos);
   EXPECT_NE(fault("3\nshapes = [2, 1]").find("shapes: has 1; it must be ascending"), std::string::npos);
-  EXPECT_NE(fault("\"auto\"\nshapes = [1]").find("shapes: does not go with modes = \"auto\""), std::string::npos);
+  EXPECT_NE(fault("\"auto\"\nshapes = [1]")
+                .find("shapes: are some of the modes; their number must stand in \"modes\" beside it"),
+            std::string::npos);
 }
 
 }  // namespace
