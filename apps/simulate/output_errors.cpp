@@ -146,16 +146,22 @@ std::string description(const OutputErrors& o) {
   return fmt::format("{} at t = {:.6g} s{}", o.name, o.when, part);
 }
 
+double OutputErrors::known() const {
+  OutputErrors o = *this;
+  for (double* part : {&o.discretisation, &o.truncation, &o.time, &o.linearisation})
+    if (std::isnan(*part)) *part = 0;
+  return o.total();
+}
+
 const OutputErrors* ErrorBudget::worst() const {
-  const OutputErrors* r = nullptr;
-  for (const OutputErrors& o : outputs)
-    if (r == nullptr || std::isnan(o.total()) || o.total() > r->total()) r = &o;
-  return r;
+  const auto most = std::ranges::max_element(outputs, {}, &OutputErrors::known);
+  return most == outputs.end() ? nullptr : &*most;
 }
 
 double ErrorBudget::total() const {
-  const OutputErrors* w = worst();
-  return w != nullptr ? w->total() : discretisation + truncation + time + linearisation;
+  if (outputs.empty()) return discretisation + truncation + time + linearisation;
+  const bool all_known = std::ranges::none_of(outputs, [](const OutputErrors& o) { return std::isnan(o.total()); });
+  return all_known ? worst()->total() : unknown;
 }
 
 }  // namespace flexboom

@@ -65,6 +65,8 @@ struct OutputErrors {
   /// Elastic coordinates have the meaning of their own basis: nothing is left out of them, no mesh is finer.
   bool is_of_its_basis() const { return name.ends_with(".q"); }
   double total() const { return time + linearisation + (is_of_its_basis() ? 0 : discretisation + truncation); }
+  /// The sum of what was measured.
+  double known() const;
 };
 
 /// Its name, when it is worst, and the largest part where that is known: "hub.rotation at t = 3.2 s, most of it
@@ -82,9 +84,9 @@ struct ErrorBudget {
   std::vector<std::string> missing;  // which part was not measured and why, one line each
   bool measured = false;             // false: the repeats were not run, or not to their end
 
-  /// The output with the largest total, or with one that is unknown; nullptr where there is none.
+  /// The output with the largest known errors; nullptr where there is none.
   const OutputErrors* worst() const;
-  /// Of the worst output.
+  /// Of the worst output; unknown where that of any output is.
   double total() const;
   bool within(double tolerance) const { return total() <= tolerance; }
 };

@@ -12,7 +12,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
+#include <numeric>
 #include <utility>
 
 namespace flexboom {
@@ -155,15 +157,30 @@ void Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::strin
     }
   };
   const size_t moved = moving_by(unmoved);
+  const auto left_out = [&](size_t count) {
+    return std::transform_reduce(list.begin() + static_cast<Index>(count), list.begin() + static_cast<Index>(moved),
+                                 0.0, std::plus(), [](const Candidate& c) { return c.displacement; });
+  };
+  // How many are enough where errors are in proportion to the displacement left out.
+  const auto expected = [&](size_t tried, double tried_error) {
+    size_t count = moved;
+    while (count > 0 && left_out(count - 1) * tried_error <= left_out(tried) * scene.tolerance / 3) --count;
+    return count;
+  };
   size_t enough = moved, too_few = 0, next = moving_by(scene.tolerance / 10);
   double error = 0;
   for (int i = 0; i < most_trials && enough > too_few && !stopped(hooks); ++i) {
-    const double e = error_with(std::min(next, enough - 1));
-    if (e <= scene.tolerance / 3)
-      enough = std::min(next, enough - 1), error = e;
+    const size_t count = std::min(next, enough - 1);
+    const double e = error_with(count);
+    const bool is_enough = e <= scene.tolerance / 3;
+    if (is_enough)
+      enough = count, error = e;
     else
-      too_few = std::min(next, enough - 1) + 1;
-    next = (enough + too_few) / 2;
+      too_few = count + 1;
+    next = expected(count, e);
+    if (is_enough && next >= enough) break;
+    const bool has_failed_before = !is_enough && i > 0;  // then the proportion does not hold
+    if (has_failed_before || next < too_few || next >= enough) next = (enough + too_few) / 2;
   }
   const Scene chosen = with_first(open, list, enough);
   for (const size_t i : open_) {
@@ -188,9 +205,11 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
   if (open_.empty() || !budget.measured || budget.within(scene.tolerance) || worst == nullptr || stopped(hooks) ||
       steps_++ >= most_steps)
     return false;
-  const double others = std::max(worst->time, worst->linearisation);
-  if (std::max(worst->truncation, worst->discretisation) <= others) return false;
-  if (worst->truncation >= worst->discretisation) {
+  const auto known = [](double part) { return std::isnan(part) ? 0 : part; };
+  const double truncation = known(worst->truncation), discretisation = known(worst->discretisation);
+  const double others = std::max(known(worst->time), known(worst->linearisation));
+  if (worst->known() <= scene.tolerance || std::max(truncation, discretisation) <= others) return false;
+  if (truncation >= discretisation) {
     const double before = std::exchange(truncation_, worst->truncation);
     constexpr double far = 100;
     if (costly_ || (truncation_ > far * scene.tolerance && truncation_ > before / 2)) return false;
