@@ -133,7 +133,8 @@ struct CommandLine {
     CLI::App* c = command("reduce", "mesh -> reduced body: basis, shapes, invariants, stiffening, certificate");
     c->add_option("BODY", reduce.model, "Body file (.toml) or mesh (.inp, .msh, .bdf, .vtu, .step, .geo)")->required();
     c->add_option("-o,--output", reduce.file, "Body to write (.h5)")->required();
-    c->add_option("--basis", reduce.basis, "clamped, mean-axis, craig-bampton or hinge (default: the file's)")
+    c->add_option("--basis", reduce.basis,
+                  "clamped, hinge, mean-axis, craig-bampton or prestressed (default: the file's)")
         ->check(CLI::IsMember(std::vector<std::string>(basis_names.begin(), basis_names.end())));
     c->add_option("--count", reduce.count, "Modes (default: what the file asks for, or 10; of a hinge per stiffness)");
     c->add_option("--backend", reduce.backend, "Eigen-solver: auto, arpack, block, spectra or dense");
@@ -149,6 +150,15 @@ struct CommandLine {
     c->add_option("--hinge-axis", reduce.hinge_axis, "Of hinge: axis through the origin, x,y,z (default 0,0,1)")
         ->delimiter(',')
         ->expected(3);
+    c->add_option("--spin", reduce.spin, "Of prestressed: angular velocity of the body's frame, x,y,z [rad/s]")
+        ->delimiter(',')
+        ->expected(3);
+    c->add_option("--acceleration", reduce.acceleration,
+                  "Of prestressed: acceleration of the frame's origin less gravity, x,y,z [m/s^2]")
+        ->delimiter(',')
+        ->expected(3);
+    c->add_option("--turns", reduce.turns,
+                  "Of prestressed: axis about which the root turns freely, x, y, z or X,Y,Z (repeatable)");
     c->add_option("--select", reduce.select,
                   "Coordinates to keep: list:1,3 band:LOW,HIGH (Hz) mass:SHARE completeness:SHARE output:SET.uy,SHARE");
     c->add_option("--damping", reduce.damping,

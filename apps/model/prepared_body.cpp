@@ -67,6 +67,7 @@ PreparedBody prepare_eq14(const BodyScene& b) {
   const int per_plane = all ? b.modes / 2 : b.modes;
   PreparedBody r;
   r.body = eq14::reduced_body(boom, per_plane, all ? eq14::Planes::xy_and_xz : eq14::Planes::xy, b.name);
+  apply_damping(r.body, b.damping);
   return r;
 }
 
@@ -170,7 +171,6 @@ PreparedBody with_all_shapes(const BodyScene& b, int refine, const std::filesyst
   if (!file.empty())
     if (std::optional<PreparedBody> kept = read_kept(file)) return kept->modes = b.modes, *std::move(kept);
   PreparedBody r = b.structure == "eq14" ? prepare_eq14(b) : prepare_model(b, refine);
-  apply_damping(r.body, b.damping);
   r.modes = b.modes;
   for (const BodyCheck& c : r.checks)
     if (!c.passed)

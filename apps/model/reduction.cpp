@@ -1,5 +1,6 @@
 #include "apps/model/reduction.hpp"
 
+#include "apps/base/axis.hpp"
 #include "apps/base/version.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
@@ -10,6 +11,7 @@
 #include "reduction/invariants/certificate.hpp"
 #include "reduction/invariants/geometric_stiffness.hpp"
 #include "reduction/invariants/inertia_invariants.hpp"
+#include "reduction/invariants/prestressed.hpp"
 #include "reduction/invariants/root_loads.hpp"
 
 #include <fmt/format.h>
@@ -53,6 +55,12 @@ void check_options(const ReduceArguments& a, const BasisOptions& basis) {
   belongs(!a.reference.empty(), "--reference", "craig-bampton");
   belongs(a.orthonormal, "--orthonormal", "craig-bampton");
   belongs(!a.hinge_stiffness.empty(), "--hinge-stiffness", "hinge");
+  belongs(!a.spin.empty(), "--spin", "prestressed");
+  belongs(!a.acceleration.empty(), "--acceleration", "prestressed");
+  belongs(!a.turns.empty(), "--turns", "prestressed");
+  require(basis.name != "prestressed" || basis.motion,
+          "--basis prestressed: give the motion that stiffens the body with --spin X,Y,Z [rad/s] or "
+          "--acceleration X,Y,Z [m/s^2]");
   require(basis.name != "craig-bampton" || !basis.interfaces.empty(),
           "--basis craig-bampton: name the places where the body is joined with --interface SET");
   require(basis.name != "hinge" || !basis.hinge_stiffness.empty(),
@@ -61,6 +69,10 @@ void check_options(const ReduceArguments& a, const BasisOptions& basis) {
   require(a.stiffening || a.loads_at.empty(), "--loads-at: loads stiffen nothing with --no-stiffening");
   require(std::set(a.loads_at.begin(), a.loads_at.end()).size() == a.loads_at.size(), "--loads-at: a set comes twice");
   require(!a.count || *a.count >= 0, fmt::format("--count: must not be negative, got {}", a.count.value_or(0)));
+}
+
+Eigen::Vector3d vector_of(const std::vector<double>& three) {
+  return three.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(three[0], three[1], three[2]);
 }
 
 /// The basis of the command line; what it leaves open is that of the body file.
@@ -73,7 +85,16 @@ BasisOptions basis_options(const ReduceArguments& a, const Model& model) {
   o.orthonormal = o.orthonormal || a.orthonormal;
   if (!a.attachments.empty()) o.corrections = a.attachments;
   if (!a.hinge_stiffness.empty()) o.hinge_stiffness = a.hinge_stiffness;
-  if (!a.hinge_axis.empty()) o.hinge_axis = Eigen::Vector3d(a.hinge_axis[0], a.hinge_axis[1], a.hinge_axis[2]);
+  if (!a.hinge_axis.empty()) o.hinge_axis = vector_of(a.hinge_axis);
+  if (!a.spin.empty() || !a.acceleration.empty()) {
+    o.motion = {.spin = vector_of(a.spin), .acceleration = vector_of(a.acceleration), .turns = {}};
+    for (const std::string& text : a.turns) {
+      const auto axis = axis_of(text);
+      require(axis.has_value(),
+              fmt::format("--turns: '{}' is no axis; there are x, y, z, and X,Y,Z of a direction", text));
+      o.motion->turns.push_back(*axis);
+    }
+  }
   o.in_plane = o.name == "hinge";
   o.modes = a.count.value_or(o.name == "hinge" ? 1 : model.modes.value_or(10));
   o.backend = a.backend.value_or(model.backend.value_or("auto"));
@@ -137,6 +158,11 @@ std::string options_text(const ReductionOptions& o) {
   if (b.name == "hinge")
     text += fmt::format(", hinge {} N m/rad about {} {} {}", fmt::join(b.hinge_stiffness, " "), b.hinge_axis.x(),
                         b.hinge_axis.y(), b.hinge_axis.z());
+  if (b.name == "prestressed" && b.motion) {
+    const auto three = [](const Eigen::Vector3d& v) { return fmt::format("{} {} {}", v.x(), v.y(), v.z()); };
+    text += fmt::format(", spin {} rad/s, acceleration {} m/s^2", three(b.motion->spin), three(b.motion->acceleration));
+    for (const Eigen::Vector3d& axis : b.motion->turns) text += ", turns about " + three(axis);
+  }
   if (o.select) text += ", select " + *o.select;
   if (o.damping.name != "none") text += ", damping " + o.damping.name;
   if (!o.stiffening) text += ", no stiffening";
@@ -202,6 +228,28 @@ ReductionOptions reduction_options(const ReduceArguments& a, const Model& model)
   return o;
 }
 
+namespace {
+
+PrestressedBasis prestressed_basis(const Mesh& mesh, const BasisModel& m, const BasisOptions& o, int threads) {
+  require(o.motion.has_value(), "prestressed: the motion that stiffens the body is not known");
+  const auto clamped = [&](int count) {
+    BasisOptions plenty = o;
+    plenty.modes = count, plenty.corrections.clear();
+    return make_basis(mesh, m, plenty, threads);
+  };
+  const int all = unknowns(mesh, m.assembly.dofs, m.clamp).count;
+  PrestressedBasis made = prestressed_modes(mesh, m.assembly, m.clamp, *o.motion, clamped, all, o.modes, threads);
+  made.basis = with_corrections(std::move(made.basis), mesh, m, o, threads);
+  return made;
+}
+
+/// Rules by modes mean those of the body at rest: the damping of the clamped modes, of which the shapes are combined.
+bool damps_modes_at_rest(const ReductionOptions& o) {
+  return o.damping.name != "rayleigh" && o.basis.corrections.empty();
+}
+
+}  // namespace
+
 ReducedBody make_reduced_body(Model& model, const ReductionOptions& options, int threads, ReductionSeconds& seconds) {
   ReductionOptions o = with_names_of(model.mesh, options);
   for (const std::string& name : o.loads_at) node_set(model.mesh, name);  // before the long work
@@ -210,7 +258,10 @@ ReducedBody make_reduced_body(Model& model, const ReductionOptions& options, int
   Stopwatch clock;
   const BasisModel m = basis_model(model.mesh, o.basis, model.clamp, o.clamp_beside, threads);
   seconds.assemble += clock.lap();
-  ModalBasis basis = make_basis(model.mesh, m, o.basis, threads);
+  std::optional<PrestressedBasis> prestressed;
+  if (o.basis.name == "prestressed" && o.basis.modes > 0)
+    prestressed = prestressed_basis(model.mesh, m, o.basis, threads);
+  ModalBasis basis = prestressed ? prestressed->basis : make_basis(model.mesh, m, o.basis, threads);
   seconds.modes += clock.lap();
   ReducedBody body = reduce(model.mesh, m.assembly, basis, model.name, threads);
   seconds.invariants += clock.lap();
@@ -230,11 +281,17 @@ ReducedBody make_reduced_body(Model& model, const ReductionOptions& options, int
     body.Kg = geometric_stiffness(model.mesh, m.assembly, m.held, basis.Phi,
                                   {.markers = loaded_markers(body, model.mesh, o.loads_at),
                                    .threads = threads,
-                                   .statics = held_statics,
+                                   // Digits that one solve loses are restored in the lowest modes only.
+                                   .statics = prestressed ? nullptr : held_statics,
                                    .Ke = &body.Ke});
   }
   seconds.stiffening += clock.lap();
   apply_damping(body, o.damping);
+  if (prestressed && damps_modes_at_rest(o)) {
+    apply_damping(prestressed->clamped, o.damping);
+    const Eigen::MatrixXd parts = clamped_parts(*prestressed, m.assembly, basis.Phi);
+    body.De = parts.transpose() * prestressed->clamped.De * parts;
+  }
   body.certificate =
       o.certified ? certificate(body, model.mesh, m.assembly, m.held, basis, exact_markers(o), threads, held_statics)
                   : check_invariants(body, model.mesh, m.assembly, basis);

@@ -44,6 +44,9 @@ struct ReduceArguments {
   std::vector<std::string> attachments;  // "SET.Fy"
   std::vector<double> hinge_stiffness;   // [N m/rad]
   std::vector<double> hinge_axis;        // of three; empty: z
+  std::vector<double> spin;              // of "prestressed", three [rad/s]
+  std::vector<double> acceleration;      // the same [m/s^2]
+  std::vector<std::string> turns;        // "x", "y", "z" or "X,Y,Z"
   std::optional<std::string> select;   // "list:1,3", "band:0,500", "mass:0.9", "completeness:0.9", "output:tip.uy,0.01"
   std::optional<std::string> damping;  // "modal:0.005", "loss-factor:0.01", "rayleigh:ALPHA,BETA", "none"
   bool stiffening = true;

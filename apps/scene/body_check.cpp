@@ -185,10 +185,12 @@ std::vector<std::string_view> sets_of(const BodyScene& body) {
 void check_clamp(Faults& faults, const std::string& path, const BodyScene& body) {
   check_name_among(faults, join(path, "clamp"), body.clamp, sets_of(body));
   if (body.clamp != "root" && body.basis.name != "clamped" && faults.clean(join(path, "basis")))
-    faults.add(join(path, "clamp"),
-               fmt::format("is {}, but the basis \"{}\" {}; drop it", toml_reader::quoted(body.clamp), body.basis.name,
-                           body.basis.name == "hinge" ? "is that of a hinge at the root"
-                                                      : "is not held by a clamp, but by its interfaces or nowhere"));
+    faults.add(
+        join(path, "clamp"),
+        fmt::format("is {}, but the basis \"{}\" {}; drop it", toml_reader::quoted(body.clamp), body.basis.name,
+                    body.basis.name == "hinge"         ? "is that of a hinge at the root"
+                    : body.basis.name == "prestressed" ? "is that of a body held at its root"
+                                                       : "is not held by a clamp, but by its interfaces or nowhere"));
 }
 
 void check_interfaces(Faults& faults, const std::string& path, const BodyScene& body) {
@@ -224,6 +226,10 @@ void check_basis(Faults& faults, const std::string& path, const BodyScene& body)
   belongs(basis.orthonormal, "orthonormal", "craig-bampton");
   belongs(!basis.hinge_stiffness.empty(), "hinge_stiffness", "hinge");
   belongs(basis.hinge_axis != BasisOptions{}.hinge_axis, "hinge_axis", "hinge");
+  belongs(basis.motion.has_value(), "prestress", "prestressed");
+  if (basis.name == "prestressed" && body.stiffening == "off")
+    faults.add(join(path, "stiffening"),
+               R"(is "off", but the basis "prestressed" is of stiffened modes; drop one of them)");
   const bool elements = body.structure == "beam" || body.structure == "solid";
   if (basis.name != "clamped" && !elements)
     faults.add(join(path, "basis"), fmt::format("is \"{}\", which needs finite elements: structure \"beam\" or "

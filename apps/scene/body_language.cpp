@@ -1,5 +1,6 @@
 // The keys of a body, as those of a scene in scene_language.cpp.
 
+#include "apps/base/axis.hpp"
 #include "apps/scene/keys.hpp"
 #include "apps/scene/scene_checks.hpp"
 #include "apps/scene/scene_keys.hpp"
@@ -174,6 +175,28 @@ void solid_keys(Archive& a, SolidOptions& o) {
   a.table({"grading", "", "Sizes of the elements."}, o.grading, grading_keys);
 }
 
+void prestress_keys(Archive& a, SteadyMotion& m) {
+  a.key({"spin", "rad/s", "angular velocity of the body's frame, its axes"}, m.spin, finite);
+  a.key({"acceleration", "m/s^2", "of its origin less gravity, axes of the body"}, m.acceleration, finite);
+  std::vector<std::string> turns;
+  for (const Eigen::Vector3d& axis : m.turns) turns.push_back(text_of_axis(axis));
+  a.key({"turns", "",
+         R"(axes about which the joint lets the root turn: `"x"`, `"y"`, `"z"` or `"X,Y,Z"` of a direction)"},
+        turns);
+  KeyReader* const reader = a.reader();
+  if (reader == nullptr) return;
+  m.turns.clear();
+  for (const std::string& text : turns) {
+    const auto axis = axis_of(text);
+    if (axis)
+      m.turns.push_back(*axis);
+    else
+      reader->table().fault("turns",
+                            fmt::format(R"(has {}; an axis of the body is "x", "y", "z", or "X,Y,Z" of a direction)",
+                                        toml_reader::quoted(text)));
+  }
+}
+
 void basis_keys(Archive& a, BasisOptions& b) {
   a.choice({"basis", "", "shapes that stand for the deformation"}, basis_names, b.name);
   if (a.reader() && b.name == "craig-bampton" && b.interfaces.empty())
@@ -193,6 +216,10 @@ void basis_keys(Archive& a, BasisOptions& b) {
         b.hinge_stiffness, stiffnesses);
   a.key({"hinge_axis", "", "of `\"hinge\"`: axis through the root", false, "that of the hinge"}, b.hinge_axis,
         some_direction);
+  if (a.use() != Use::write || b.name == "prestressed")
+    a.table({"prestress", "", R"(of `"prestressed"`: the motion that stiffens the body)", false,
+             "that of the joints at rest"},
+            b.motion, prestress_keys, "Prestress");
   a.key({"corrections", "", R"(static shapes of unit loads beside the modes: `"tip.Fy"`, `"root.Mz"`)"}, b.corrections);
 }
 

@@ -156,7 +156,8 @@ Scene scene_of_table(const Value& root, Reading& reading) {
   Scene scene;
   read_keys(table, reading, scene, scene_keys_of_file);
   for (BodyScene& body : scene.bodies)
-    if (scene.is_tree && body.stiffening.empty() && !body.rigid) body.stiffening = "auto";
+    if ((scene.is_tree || body.basis.name == "prestressed") && body.stiffening.empty() && !body.rigid)
+      body.stiffening = "auto";
   for (JointScene& j : scene.joints) look_up(scene, j.a), look_up(scene, j.b);
   for (SpringScene& s : scene.springs) look_up(scene, s.a), look_up(scene, s.b);
   for (LoadScene& l : scene.loads) look_up(scene, l.at);

@@ -4,6 +4,7 @@
 #include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/multipliers_flight.hpp"
 #include "apps/simulate/planner.hpp"
+#include "apps/simulate/steady_motion.hpp"
 #include "apps/simulate/tree_flight.hpp"
 #include "apps/simulate/verify.hpp"
 #include "dynamics/numerics/rotation.hpp"
@@ -116,7 +117,7 @@ PreparedBody prepared(const BodyScene& b, int refine, const std::filesystem::pat
 
 Run run_once(const Scene& given, const RunHooks& hooks, int refine, long max_steps) {
   const Stopwatch start;
-  const Scene scene = with_joints(given);
+  const Scene scene = with_joints(with_steady_motions(given));
   std::vector<PreparedBody> bodies;
   for (const BodyScene& b : scene.bodies) bodies.push_back(prepared(b, refine, scene.bodies_kept_in, hooks));
   const double seconds = start.seconds();
@@ -236,6 +237,7 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
   RunResult r;
   r.scene = given;
   validate(r.scene);
+  r.scene = with_steady_motions(r.scene);
   Planner planner(r.scene);
   planner.choose(r.scene, hooks, r.plan);
   RunHooks of_run = hooks;

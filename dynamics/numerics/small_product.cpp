@@ -30,7 +30,7 @@ template <class Register, int registers, int columns>
   for (Index k = 0; k < f.inner; ++k, a += f.A.stride, ++b) {
     Register part[registers];
 #pragma GCC unroll 8
-    for (int r = 0; r < registers; ++r) part[r].of = *reinterpret_cast<const Anywhere*>(a + r * width);
+    for (Index r = 0; r < registers; ++r) part[r].of = *reinterpret_cast<const Anywhere*>(a + r * width);
 #pragma GCC unroll 8
     for (int c = 0; c < columns; ++c)
 #pragma GCC unroll 8
@@ -39,7 +39,7 @@ template <class Register, int registers, int columns>
 #pragma GCC unroll 8
   for (int c = 0; c < columns; ++c)
 #pragma GCC unroll 8
-    for (int r = 0; r < registers; ++r)
+    for (Index r = 0; r < registers; ++r)
       *reinterpret_cast<Anywhere*>(f.C + (column + c) * f.stride_C + row + r * width) = sum[c][r].of;
 }
 

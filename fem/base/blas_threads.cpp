@@ -67,7 +67,7 @@ WithoutOpenMP::WithoutOpenMP() : levels_(openmp_levels()) { set_openmp_levels(0)
 
 WithoutOpenMP::~WithoutOpenMP() { set_openmp_levels(levels_); }
 
-OneBlasThread::OneBlasThread() : threads_(1) {
+OneBlasThread::OneBlasThread() {
   static const auto get = library<int (*)()>("openblas_get_num_threads");
   static const auto set = library<void (*)(int)>("openblas_set_num_threads");
   if (get && set && (threads_ = get()) > 1) set(1);

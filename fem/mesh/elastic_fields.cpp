@@ -86,7 +86,7 @@ template <int count, class Lanes>
 [[gnu::always_inline]] inline void add_loads(const PointBlock& block, const Lanes* strains, int first, int lanes,
                                              const PackedWork& work, double* to) {
   Lanes sums[count] = {};
-  for (std::ptrdiff_t s = 0; s < 6 * block.points; ++s) {
+  for (std::ptrdiff_t s = 0; s < std::ptrdiff_t{6} * block.points; ++s) {
     const double* const stress = block.stresses + s * block.loads + first;
 #pragma GCC unroll 12
     for (int c = 0; c < count; ++c) sums[c].of += strains[s].of * stress[c];

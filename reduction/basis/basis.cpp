@@ -87,7 +87,7 @@ ModalBasis interface_basis(const Mesh& mesh, const BasisModel& m, const BasisOpt
 }
 
 /// Rows in the order of basis_names.
-constexpr std::array makers = {clamped_basis, hinge_basis, mean_axis_basis, interface_basis};
+constexpr std::array makers = {clamped_basis, hinge_basis, mean_axis_basis, interface_basis, clamped_basis};
 
 size_t row_of(const BasisOptions& o) {
   const auto* const name = std::ranges::find(basis_names, o.name);
@@ -127,8 +127,8 @@ BasisModel basis_model(Mesh& mesh, const BasisOptions& o, const Clamp& clamp, bo
   return m;
 }
 
-ModalBasis make_basis(const Mesh& mesh, const BasisModel& m, const BasisOptions& o, int threads) {
-  ModalBasis basis = makers[row_of(o)](mesh, m, o, threads);
+ModalBasis with_corrections(ModalBasis basis, const Mesh& mesh, const BasisModel& m, const BasisOptions& o,
+                            int threads) {
   std::vector<AttachmentLoad> loads;
   for (const std::string& text : o.corrections) {
     const auto [marker, direction] = place_and_direction("static correction", text);
@@ -136,6 +136,10 @@ ModalBasis make_basis(const Mesh& mesh, const BasisModel& m, const BasisOptions&
   }
   if (loads.empty()) return basis;
   return with_attachment_modes(std::move(basis), mesh, m.assembly, m.held, loads, threads);
+}
+
+ModalBasis make_basis(const Mesh& mesh, const BasisModel& m, const BasisOptions& o, int threads) {
+  return with_corrections(makers[row_of(o)](mesh, m, o, threads), mesh, m, o, threads);
 }
 
 }  // namespace flexboom

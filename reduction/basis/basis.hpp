@@ -2,17 +2,20 @@
 
 #include "reduction/basis/interface_nodes.hpp"
 #include "reduction/basis/modal_basis.hpp"
+#include "reduction/body/steady_motion.hpp"
 
 #include <Eigen/Core>
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace flexboom {
 
-inline constexpr std::array<std::string_view, 4> basis_names = {"clamped", "hinge", "mean-axis", "craig-bampton"};
+inline constexpr std::array<std::string_view, 5> basis_names = {"clamped", "hinge", "mean-axis", "craig-bampton",
+                                                                "prestressed"};
 
 /// Which shapes a body gets.
 struct BasisOptions {
@@ -25,6 +28,7 @@ struct BasisOptions {
   bool orthonormal = false;  // of "craig-bampton": modes of the reduced body
   std::vector<double> hinge_stiffness;                    // of "hinge": of each regime [N m/rad]
   Eigen::Vector3d hinge_axis = Eigen::Vector3d::UnitZ();  // of "hinge": through the BRF origin
+  std::optional<SteadyMotion> motion;                     // of "prestressed"
   std::vector<std::string> corrections;                   // static shapes of unit loads, "SET.Fx" ... "SET.Mz"
   std::string backend = "auto";                           // eigen-solver
   bool keep_factor = false;                               // as EigenOptions
@@ -43,9 +47,14 @@ struct BasisModel {
 /// @throws InputError for options that belong to another basis, and as place_interfaces.
 BasisModel basis_model(Mesh&, const BasisOptions&, const Clamp& clamp, bool beside = false, int threads = 1);
 
-/// The shapes. Without modes there are none (but those of interfaces and corrections).
+/// The shapes. Without modes there are none (but those of interfaces and corrections). Of "prestressed" it makes the
+/// clamped modes that prestressed_modes combines.
 /// @throws InputError, NumericalError as the function of each basis.
 ModalBasis make_basis(const Mesh&, const BasisModel&, const BasisOptions&, int threads = 1);
+
+/// A basis with the static shapes of `options.corrections`. @throws InputError, NumericalError as
+/// with_attachment_modes.
+ModalBasis with_corrections(ModalBasis, const Mesh&, const BasisModel&, const BasisOptions&, int threads = 1);
 
 /// "SET.Fy" -> ("SET", "Fy"). `of` is named in the error. @throws InputError.
 std::pair<std::string, std::string> place_and_direction(const std::string& of, const std::string& text);

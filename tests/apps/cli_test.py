@@ -1186,6 +1186,13 @@ class Reduce(Case):
         self.assertEqual(len(document["coordinates"]), 2)
         self.assertEqual(self.failed(document), [])
 
+    def test_prestressed_basis(self):
+        document = self.reduce("--basis", "prestressed", "--spin", "0,0,30", "--acceleration=-90,0,0", "--turns", "z",
+                               "--count", "4", "--damping", "modal:0.01")[1]
+        self.assertEqual(len(document["coordinates"]), 4)
+        self.assertEqual(self.failed(document), [])
+        self.assertIn("spin 0 0 30 rad/s", document["provenance"]["options"])
+
     def test_selection(self):
         document = self.reduce("--count", "8", "--select", "list:1,3")[1]
         self.assertEqual(len(document["coordinates"]), 2)
@@ -1197,6 +1204,9 @@ class Reduce(Case):
         self.refused("--basis", "craig-bampton", words="--interface")
         self.refused("--basis", "craig-bampton", "--interface", "nowhere", words="nowhere")
         self.refused("--basis", "hinge", words="--hinge-stiffness")
+        self.refused("--basis", "prestressed", words="--spin")
+        self.refused("--spin", "0,0,1", words="prestressed")
+        self.refused("--basis", "prestressed", "--spin", "0,0,1", "--turns", "w", words="X,Y,Z")
         self.refused("--select", "best", words="--select")
         self.refused("--damping", "much", words="--damping")
         self.refused("--attach", "tip", words="tip.Fy")

@@ -205,6 +205,8 @@ TEST(Scene, EveryKeyThatIsReadIsWritten) {
         with_basis("craig-bampton",
                    "interfaces = [\"root\", \"head:distributing\"]\nreference = \"root\"\northonormal = true\n"
                    "corrections = [\"tip.Fz\"]"),
+        with_basis("prestressed",
+                   "prestress = { spin = [0, 0.5, 2], acceleration = [1, 0, 0], turns = [\"z\", \"0,0.6,0.8\"] }"),
         std::string(full_tree), others, laws, tables, pads, std::string(builtin_scene("sport-calibration")),
         std::string(builtin_scene("slider-crank"))}) {
     known.merge(keys_known(text, "."));
@@ -328,6 +330,10 @@ TEST(Basis, ThatCannotServeIsAnErrorInWords) {
   EXPECT_NE(of("basis = \"craig-bampton\"\nreference = \"tp\"").find("did you mean \"tip\""), std::string::npos);
   EXPECT_NE(of("basis = \"mean-axis\"\nclamp = \"tip\"").find("is not held by a clamp"), std::string::npos);
   EXPECT_NE(of("basis = \"hinge\"\nhinge_stiffness = -1").find("zero or positive"), std::string::npos);
+  EXPECT_NE(of("prestress = { spin = [0, 0, 1] }").find("belongs to basis = \"prestressed\""), std::string::npos);
+  EXPECT_NE(of("basis = \"prestressed\"\nprestress = { turns = [\"w\"] }").find("has \"w\"; an axis"),
+            std::string::npos);
+  EXPECT_NE(of("basis = \"prestressed\"\nclamp = \"tip\"").find("held at its root"), std::string::npos);
   EXPECT_NE(of("corrections = [\"tip\"]").find("must be a node set and a direction"), std::string::npos);
   EXPECT_NE(of("corrections = [\"tip.ux\"]").find("a load is Fx"), std::string::npos);
   const std::string tree = with(swing_on_joints, "modes = 1", "modes = 1\nbasis = \"mean-axis\"");

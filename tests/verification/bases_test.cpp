@@ -91,6 +91,7 @@ struct Basis {
 // the many modes that they need. The frames differ by the square of the deflection, which is 1e-5 of the motion here.
 constexpr Basis bases[] = {
     {"hinge", "basis = \"hinge\"\nmodes = 3\ncorrections = [\"tip.Fy\"]"},
+    {"prestressed", "basis = \"prestressed\"\nmodes = 5"},
     {"craig-bampton", "basis = \"craig-bampton\"\nmodes = 4"},
     {"orthonormal craig-bampton", "basis = \"craig-bampton\"\nmodes = 4\northonormal = true"},
     {"craig-bampton carried at its tip", "basis = \"craig-bampton\"\nmodes = 4\nreference = \"tip\""},
