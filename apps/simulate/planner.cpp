@@ -28,6 +28,7 @@ constexpr double unmoved = 1e-10;  // of the largest displacement: round-off of 
 constexpr int fewest = 4;          // candidates per body
 constexpr int most_trials = 6;     // runs with fewer modes
 constexpr int most_steps = 3;      // improvements
+constexpr int most_doublings = 2;  // of the candidates, where no budget shows what they leave out
 
 bool stopped(const RunHooks& hooks) { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
 
@@ -138,6 +139,26 @@ Run Planner::with_all(const Scene& scene, const RunHooks& hooks, Scene& open, Sc
 
 void Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
   if (open_.empty()) return;
+  const Scene given = scene;
+  std::vector<std::string> words;
+  // The budget shows what the candidates leave out. Without it they are enough where fewer of them are.
+  for (int step = 0;; ++step) {
+    scene = given, words.clear();
+    const bool all_needed = choose_among_candidates(scene, hooks, words);
+    plan.insert(plan.end(), words.begin(), words.end());
+    if (given.error_budget || !all_needed || stopped(hooks)) return;
+    if (step == most_doublings || costly_) break;
+    candidates_ *= 2;
+    plan.push_back(
+        fmt::format("modes: all that move are needed; they are chosen again, from {} of each body", candidates_));
+  }
+  scene.warnings.push_back(
+      fmt::format("the modes may be too few for {:.1e}: all of the {} of each body that move are needed, and the error "
+                  "budget is off",
+                  scene.tolerance, candidates_));
+}
+
+bool Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
   Scene open, all;
   const Run reference = with_all(scene, hooks, open, all, plan);
   const OutputTable wanted = without_coordinates(reference.outputs);
@@ -198,6 +219,7 @@ void Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::strin
         "by {:.1e} together with those of all bodies",
         b.name, counted(taken), taken.size() + small.size() + still.size(), counted(still), counted(small), error));
   }
+  return moved > 0 && enough == moved;
 }
 
 bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {

@@ -13,7 +13,8 @@ class Planner {
  public:
   explicit Planner(const Scene&);
 
-  /// Candidates that no motion reaches are left out; of the others, the fewest that move most and are enough.
+  /// Candidates that no motion reaches are left out; of the others, the fewest that move most and are enough. Where the
+  /// scene has no budget and all are needed, there are twice as many; where that ends, the scene gets a warning.
   /// Afterwards no body of the scene is left open. `plan` gets one line per body.
   /// @throws InputError, NumericalError as run_once, of the candidates.
   void choose(Scene&, const RunHooks&, std::vector<std::string>& plan);
@@ -32,6 +33,8 @@ class Planner {
     double displacement = 0;  // the largest of any point at any time [m]
   };
 
+  /// Are all of them that move needed?
+  bool choose_among_candidates(Scene&, const RunHooks&, std::vector<std::string>& plan);
   Scene with_candidates(const Scene&, int candidates, const RunHooks&) const;
   /// The run that the others are compared with, as precise as that takes: as many candidates as are bearable. `open`
   /// has them and leaves stiffening as it was, `all` is what was run.

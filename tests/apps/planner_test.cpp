@@ -97,6 +97,17 @@ TEST(Planner, ARunGoesOnToBetterModelsUntilTheBudgetIsMet) {
   EXPECT_LT(r.budget.discretisation, 1e-2);
 }
 
+TEST(Planner, WithoutABudgetCandidatesAreEnoughWhereFewerAre) {
+  Scene easy = spun_about("z", 1e-2), hard = spun_about("z", 1e-12);
+  easy.error_budget = hard.error_budget = false;
+  const RunResult r = run_scene(easy, {});
+  EXPECT_FALSE(any_has(r.plan, "chosen again"));
+  EXPECT_FALSE(any_has(r.warnings, "may be too few"));
+  const RunResult all = run_scene(hard, {});
+  EXPECT_TRUE(any_has(all.plan, "chosen again, from 24"));
+  EXPECT_TRUE(any_has(all.warnings, "the modes may be too few for 1.0e-12"));
+}
+
 TEST(Planner, ThePlanIsPartOfTheSceneThatWasRun) {
   const RunResult r = run_scene(spun_about("z", 1e-3), {});
   EXPECT_FALSE(r.scene.bodies[1].modes_auto);
