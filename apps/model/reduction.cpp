@@ -75,6 +75,21 @@ Eigen::Vector3d vector_of(const std::vector<double>& three) {
   return three.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(three[0], three[1], three[2]);
 }
 
+/// The motion of the command line; what it leaves open is that of the body file, or none.
+SteadyMotion steady_motion(const ReduceArguments& a, const std::optional<SteadyMotion>& of_file) {
+  SteadyMotion motion = of_file.value_or(SteadyMotion{});
+  if (!a.spin.empty()) motion.spin = vector_of(a.spin);
+  if (!a.acceleration.empty()) motion.acceleration = vector_of(a.acceleration);
+  if (!a.turns.empty()) motion.turns.clear();
+  for (const std::string& text : a.turns) {
+    const auto axis = axis_of(text);
+    require(axis.has_value(),
+            fmt::format("--turns: '{}' is no axis; there are x, y, z, and X,Y,Z of a direction", text));
+    motion.turns.push_back(*axis);
+  }
+  return motion;
+}
+
 /// The basis of the command line; what it leaves open is that of the body file.
 BasisOptions basis_options(const ReduceArguments& a, const Model& model) {
   BasisOptions o;
@@ -86,15 +101,7 @@ BasisOptions basis_options(const ReduceArguments& a, const Model& model) {
   if (!a.attachments.empty()) o.corrections = a.attachments;
   if (!a.hinge_stiffness.empty()) o.hinge_stiffness = a.hinge_stiffness;
   if (!a.hinge_axis.empty()) o.hinge_axis = vector_of(a.hinge_axis);
-  if (!a.spin.empty() || !a.acceleration.empty()) {
-    o.motion = {.spin = vector_of(a.spin), .acceleration = vector_of(a.acceleration), .turns = {}};
-    for (const std::string& text : a.turns) {
-      const auto axis = axis_of(text);
-      require(axis.has_value(),
-              fmt::format("--turns: '{}' is no axis; there are x, y, z, and X,Y,Z of a direction", text));
-      o.motion->turns.push_back(*axis);
-    }
-  }
+  if (!a.spin.empty() || !a.acceleration.empty() || !a.turns.empty()) o.motion = steady_motion(a, o.motion);
   o.in_plane = o.name == "hinge";
   o.modes = a.count.value_or(o.name == "hinge" ? 1 : model.modes.value_or(10));
   o.backend = a.backend.value_or(model.backend.value_or("auto"));

@@ -227,9 +227,6 @@ void check_basis(Faults& faults, const std::string& path, const BodyScene& body)
   belongs(!basis.hinge_stiffness.empty(), "hinge_stiffness", "hinge");
   belongs(basis.hinge_axis != BasisOptions{}.hinge_axis, "hinge_axis", "hinge");
   belongs(basis.motion.has_value(), "prestress", "prestressed");
-  if (basis.name == "prestressed" && body.stiffening == "off")
-    faults.add(join(path, "stiffening"),
-               R"(is "off", but the basis "prestressed" is of stiffened modes; drop one of them)");
   const bool elements = body.structure == "beam" || body.structure == "solid";
   if (basis.name != "clamped" && !elements)
     faults.add(join(path, "basis"), fmt::format("is \"{}\", which needs finite elements: structure \"beam\" or "

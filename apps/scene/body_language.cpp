@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 namespace flexboom {
 namespace {
@@ -39,11 +38,10 @@ void mode_count(Faults& faults, const std::string& path, const NumberOrWord& mod
   from_to(faults, path, modes.number, 0.0, 10000.0, ", or \"auto\"");  // more is a typing error
 }
 
-void shape_numbers(Faults& faults, const std::string& path, const std::vector<double>& values, std::string_view) {
-  double before = 0;
-  for (const double v : values) {
-    if (v != std::floor(v) || v <= before)
-      return faults.add(path, fmt::format("has {}; it must be ascending whole numbers from 1 on", v));
+void shape_numbers(Faults& faults, const std::string& path, const std::vector<int>& values, std::string_view) {
+  int before = 0;
+  for (const int v : values) {
+    if (v <= before) return faults.add(path, fmt::format("has {}; it must be ascending whole numbers from 1 on", v));
     before = v;
   }
 }
@@ -234,14 +232,13 @@ void model_keys(Archive& a, BodyScene& b) {
   a.key({"clamp", "", R"(node set that is fixed: `"root"`, `"tip"` or the name of an attachment)"}, b.clamp);
   NumberOrWord modes{static_cast<double>(b.modes), b.modes_auto ? "auto" : "", true};
   a.choice_or_number({"modes", "", "number of modes, 0 to 10000", false, "`\"auto\"`"}, mode_words, modes, mode_count);
-  std::vector<double> shapes(b.shapes.begin(), b.shapes.end());
-  if (a.use() != Use::write || !shapes.empty())
-    a.key({"shapes", "", "which of the modes stand for the body, counted from 1", false, "all"}, shapes, shape_numbers);
+  if (a.use() != Use::write || !b.shapes.empty())
+    a.key({"shapes", "", "which of the modes stand for the body, counted from 1", false, "all"}, b.shapes,
+          shape_numbers);
   if (KeyReader* reader = a.reader()) {
     b.modes = static_cast<int>(modes.number), b.modes_auto = modes.word == "auto";
     b.modes_given = b.modes_given || reader->has("modes");
     b.directions_given = b.directions_given || reader->has("directions");
-    b.shapes.assign(shapes.begin(), shapes.end());
   }
   if (a.use() != Use::write || b.directions_given || !b.modes_auto)  // a plan has those that are not given
     a.choice({"directions", "", "modes that count, bending along y or all"}, directions, b.directions);

@@ -80,6 +80,16 @@ void read(KeyReader& r, const Key& k, std::vector<double>& v) {
   if (r.has(k.name)) v = r.table().numbers(k.name);
   if (k.required && v.empty() && !r.has(k.name)) r.table().fault(k.name, "is missing; give an array of numbers");
 }
+void read(KeyReader& r, const Key& k, std::vector<int>& v) {
+  if (!r.has(k.name)) return;
+  v.clear();
+  for (const double number : r.table().numbers(k.name)) {
+    constexpr double most = 1e9;
+    if (number != std::floor(number) || std::abs(number) > most)
+      return r.table().fault(k.name, fmt::format("has {}; it must be whole numbers", number));
+    v.push_back(static_cast<int>(number));
+  }
+}
 void read(KeyReader& r, const Key& k, std::optional<double>& v) {
   if (r.has(k.name)) v = r.table().number(k.name);
 }

@@ -54,8 +54,8 @@ using AnyKeyValue =
     std::variant<KeyValue<double>, KeyValue<int>, KeyValue<bool>, KeyValue<std::string>, KeyValue<Choice>,
                  KeyValue<NumberOrWord>, KeyValue<Eigen::Vector3d>, KeyValue<Eigen::Vector4d>,
                  KeyValue<Eigen::Matrix3d>, KeyValue<std::vector<std::string>>, KeyValue<std::vector<double>>,
-                 KeyValue<std::optional<double>>, KeyValue<CourseScene>, KeyValue<std::vector<CourseScene>>,
-                 KeyValue<std::array<CourseScene, 3>>>;
+                 KeyValue<std::vector<int>>, KeyValue<std::optional<double>>, KeyValue<CourseScene>,
+                 KeyValue<std::vector<CourseScene>>, KeyValue<std::array<CourseScene, 3>>>;
 
 class Archive;
 class KeyReader;

@@ -4,7 +4,9 @@
 #include "apps/scene/scene_checks.hpp"
 #include "apps/scene/scene_keys.hpp"
 #include "apps/scene/scene_law.hpp"
+#include "apps/scene/wanted_accuracy.hpp"
 #include "dynamics/methods/integrator.hpp"
+#include "fem/base/check.hpp"
 
 #include <fmt/format.h>
 
@@ -51,7 +53,19 @@ void check_accuracy(Faults& faults, const Scene& scene) {
   const std::vector<std::string> known = outputs_of(with_joints(scene));
   const std::vector<std::string_view> names(known.begin(), known.end());
   if (!body_names_known(faults, scene)) return;
-  for (const std::string& output : scene.outputs) {
+  for (const std::string& text : scene.outputs) {
+    WantedOutput wanted;
+    try {
+      wanted = wanted_output(text);
+    } catch (const InputError& e) {
+      faults.add("accuracy.outputs", e.what());
+      continue;
+    }
+    if (wanted.accuracy > 0 && wanted.unit.empty() && wanted.accuracy < scene.tolerance)
+      faults.add("accuracy.outputs",
+                 fmt::format("is '{}', tighter than tolerance, {:g}; tolerance is the tightest that is relative", text,
+                             scene.tolerance));
+    const std::string& output = wanted.name;
     const auto without = std::ranges::find_if(scene.bodies, [&](const BodyScene& b) {
       return b.reduced && b.reduced->n() > 0 && output == b.name + ".tip" && !tip_of(*b.reduced);
     });

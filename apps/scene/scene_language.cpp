@@ -1,9 +1,9 @@
 // The keys of a scene: name, unit, meaning, value, range. Their defaults are those of the structs.
 
-#include "apps/scene/absolute_error.hpp"
 #include "apps/scene/keys.hpp"
 #include "apps/scene/scene_checks.hpp"
 #include "apps/scene/scene_keys.hpp"
+#include "apps/scene/wanted_accuracy.hpp"
 
 #include <fmt/format.h>
 
@@ -77,7 +77,11 @@ void absolute_errors(Faults& faults, const std::string& path, const std::vector<
 
 void accuracy_keys(Archive& a, Scene& s) {
   a.key({"tolerance", "", "relative error wanted in the outputs, 1e-14 to 0.1"}, s.tolerance, tolerance);
-  a.key({"outputs", "", "columns whose errors count, a vector being one: `\"hub.rotation\"`", false, "all"}, s.outputs);
+  a.key(
+      {"outputs", "",
+       R"(columns whose errors count, a vector being one: `"hub.rotation"`; with an accuracy of its own `"hub.rotation 1e-4"` or `"hub.rotation 1e-9 rad"`)",
+       false, "all"},
+      s.outputs);
   a.key({"absolute", "", R"(errors that do not count, with their unit: `["1e-9 rad", "1e-6 m"]`)", false, "none"},
         s.absolute, absolute_errors);
   a.key({"budget", "", "whether the run is repeated to measure its errors"}, s.error_budget);

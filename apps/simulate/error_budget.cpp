@@ -70,16 +70,18 @@ struct Measuring {
     budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
   }
 
-  /// Enters what a repeat has changed in each output, and `more` in all.
+  /// Enters what a repeat has changed in each output, and `more` of the largest value of each. Returns the largest.
   double enter(Part part, const std::vector<OutputDifference>& differences, double more = 0) {
+    double most = 0;
     for (OutputErrors& o : budget.outputs) {
       const auto d = std::ranges::find(differences, o.name, &OutputDifference::name);
       const double error = d == differences.end() ? 0 : d->error, before = worst_part(o);
-      o.*part = error + more;
-      if (d != differences.end()) o.scale = std::max(o.scale, d->scale);
+      if (d != differences.end()) o.scale = std::max(o.scale, d->scale), o.size = std::max(o.size, d->size);
+      o.*part = error + (o.scale > 0 ? more * o.size / o.scale : 0);
       if (error > before) o.when = d->time;
+      most = std::max(most, o.*part);
     }
-    return largest(differences) + more;
+    return most;
   }
 
   /// What `repeat` says; the run that is repeated outlives its failure.
@@ -223,7 +225,8 @@ ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, 
   Scene flown = as_flown(scene, run);
   for (const OutputDifference& d : compare_outputs(run.outputs, run.outputs, scene.outputs, m.floors)) {
     budget.outputs.push_back({});
-    budget.outputs.back().name = d.name, budget.outputs.back().scale = d.scale;
+    OutputErrors& o = budget.outputs.back();
+    o.name = d.name, o.scale = d.scale, o.size = d.size;
   }
   budget.linearisation = m.measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
   const BodyScene* reduced = any_reduced(scene);

@@ -8,7 +8,9 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <optional>
 #include <utility>
 
 namespace flexboom {
@@ -35,9 +37,12 @@ std::string output_of_column(const std::string& column) {
   return column;
 }
 
-bool is_wanted(const std::string& output, const std::vector<std::string>& wanted) {
-  if (output == "t" || output.starts_with("energy.") || output.starts_with("lvlh.")) return false;
-  return wanted.empty() || std::find(wanted.begin(), wanted.end(), output) != wanted.end();
+/// How it is wanted, if it is.
+std::optional<WantedOutput> wanted_as(const std::string& output, const std::vector<WantedOutput>& wanted) {
+  if (output == "t" || output.starts_with("energy.") || output.starts_with("lvlh.")) return {};
+  if (wanted.empty()) return WantedOutput{output};
+  const auto found = std::ranges::find(wanted, output, &WantedOutput::name);
+  return found == wanted.end() ? std::nullopt : std::optional(*found);
 }
 
 /// Angle of the rotation that leads from one rotation vector to another: their difference jumps where the angle passes
@@ -83,33 +88,27 @@ double bearable(const std::string& output, const OutputFloors& floors, const std
 
 bool is_coordinate(const std::string& column) { return output_of_column(column).ends_with(".q"); }
 
-std::string_view unit_of(const std::string& output) {
-  static const std::map<std::string, std::string_view> units = {
-      {"angle", "rad"},  {"angle1", "rad"},  {"angle2", "rad"},   {"rotation", "rad"}, {"pointing", "rad"},
-      {"rate", "rad/s"}, {"rate1", "rad/s"}, {"rate2", "rad/s"},  {"spin", "rad/s"},   {"length", "m"},
-      {"position", "m"}, {"tip", "m"},       {"velocity", "m/s"}, {"force", "N"},      {"torque", "N m"}};
-  const auto found = units.find(last_word(output));
-  return found == units.end() ? "" : found->second;
-}
-
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted, const OutputFloors& floors) {
-  std::vector<std::string> order;
+  std::vector<WantedOutput> asked, order;
+  std::ranges::transform(wanted, std::back_inserter(asked), wanted_output);
   std::map<std::string, std::pair<ColumnPlaces, ColumnPlaces>> columns;
   Index time = -1;
   for (size_t i = 0; i < a.names.size(); ++i) {
     if (a.names[i] == "t") time = static_cast<Index>(i);
     const auto j = std::find(b.names.begin(), b.names.end(), a.names[i]);
     const std::string output = output_of_column(a.names[i]);
-    if (j == b.names.end() || !is_wanted(output, wanted)) continue;
-    if (!columns.contains(output)) order.push_back(output);
+    const std::optional<WantedOutput> as = wanted_as(output, asked);
+    if (j == b.names.end() || !as) continue;
+    if (!columns.contains(output)) order.push_back(*as);
     columns[output].first.push_back(static_cast<Index>(i));
     columns[output].second.push_back(j - b.names.begin());
   }
   const std::map<std::string_view, double> all = largest_of_units(b);
   const Index rows = std::min(a.values.rows(), b.values.rows());
   std::vector<OutputDifference> result;
-  for (const std::string& output : order) {
+  for (const WantedOutput& as : order) {
+    const std::string& output = as.name;
     const auto& [of_a, of_b] = columns[output];
     OutputDifference d;
     d.name = output;
@@ -117,9 +116,11 @@ std::vector<OutputDifference> compare_outputs(const OutputTable& a, const Output
     for (Index row = 0; row < rows; ++row) {
       const VectorXd u = values_at(a, row, of_a), v = values_at(b, row, of_b);
       const double here = output.ends_with(".rotation") ? angle_between(u, v) : (u - v).norm();
-      d.scale = std::max(d.scale, v.norm());
+      d.size = std::max(d.size, v.norm());
       if (here > difference) difference = here, d.time = time < 0 ? 0 : a.values(row, time);
     }
+    d.scale = d.size;
+    if (as.accuracy > 0) d.scale = (as.unit.empty() ? as.accuracy * d.size : as.accuracy) / floors.tolerance;
     d.scale = std::max(d.scale, bearable(output, floors, all) / floors.tolerance);
     d.error = d.scale > 0 ? difference / d.scale : difference;
     result.push_back(d);

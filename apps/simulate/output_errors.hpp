@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/scene/absolute_error.hpp"
+#include "apps/scene/wanted_accuracy.hpp"
 #include "dynamics/events/flight.hpp"
 
 #include <Eigen/Core>
@@ -18,9 +18,6 @@ struct OutputTable {
   Eigen::MatrixXd values;  // rows: times
 };
 
-/// "m/s" of "hub.velocity"; empty of elastic coordinates, drives and energies.
-std::string_view unit_of(const std::string& output);
-
 /// Is a column an elastic coordinate, "boom.q2"?
 bool is_coordinate(const std::string& column);
 
@@ -36,11 +33,13 @@ struct OutputDifference {
   double error = 0;  // the largest over time, by the scale
   double scale = 0;  // the largest value of the output over time, or its floor where that is more [its unit]
   double time = 0;   // of the largest [s]
+  double size = 0;   // the largest value of the output over time [its unit]
 };
 
 /// Over the outputs that both tables have and that are wanted (all when `wanted` is empty): max over time of |a - b|,
 /// by the largest |b| over time. With floors that is no less than what tolerance makes of an absolute error and of
-/// round-off: 1e-14 of a radian, of the scene's length, or of the largest output of the same unit.
+/// round-off: 1e-14 of a radian, of the scene's length, or of the largest output of the same unit. An output with an
+/// accuracy of its own (as wanted_output) is scaled so that its error is `tolerance` where it has that accuracy.
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted, const OutputFloors& = {});
 
@@ -61,6 +60,7 @@ struct OutputErrors {
   double scale = 0;  // [its unit]
   double discretisation = unknown, truncation = unknown, time = unknown, linearisation = unknown;
   double when = 0;  // the largest of them is worst [s]
+  double size = 0;  // as OutputDifference [its unit]
 
   /// Elastic coordinates have the meaning of their own basis: nothing is left out of them, no mesh is finer.
   bool is_of_its_basis() const { return name.ends_with(".q"); }

@@ -35,11 +35,17 @@ TreeState steady_state(const Scene& scene, const Tree& tree) {
   return state;
 }
 
-/// Axes of the body about which its joint lets it turn.
+/// Does anything in the joint hold the root, at times?
+bool holds(const JointScene& j) {
+  return j.mechanism.stiffness > 0 || j.mechanism.stop_stiffness > 0 || j.law.given() || j.drive.given() ||
+         !j.motion.empty();
+}
+
+/// Axes of the body about which its joint lets it turn freely.
 std::vector<Vector3d> free_turns(const Scene& scene, const std::string& body) {
   std::vector<Vector3d> turns;
   for (const JointScene& j : scene.joints) {
-    if (j.b.body != body || j.closes_loop || j.drive.given() || !j.motion.empty()) continue;
+    if (j.b.body != body || j.closes_loop || holds(j)) continue;
     const Matrix3d axes = j.b.axes();  // columns: those of its place
     const JointType& type = joint_type(j.kind);
     for (int i = 0; i < type.freedoms; ++i) {

@@ -7,8 +7,7 @@ namespace flexboom {
 /// Gives bodies of basis "prestressed" that name no motion a steady one, all bodies taken as rigid: free bodies spin as
 /// at the start, other joints rest at zero or where their spring does. It has their spin, and the acceleration that
 /// keeps all of them turning about their mass centre with it. Their roots turn as the joint that carries them lets
-/// them.
-/// @throws InputError as Tree.
+/// them; a spring, a stop, a law, a drive or a motion holds them. @throws InputError as Tree.
 Scene with_steady_motions(Scene);
 
 }  // namespace flexboom

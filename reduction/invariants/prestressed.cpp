@@ -106,7 +106,6 @@ PrestressedShapes prestressed_shapes(const ReducedBody& body, const SteadyMotion
   require(motion.spin.allFinite() && motion.acceleration.allFinite(), "prestressed: its motion is not finite");
   constexpr double negligible = 1e-9;  // of an M-normal mode: round-off of a rigid rotation, or of shapes before it
   const std::vector<Vector3d> turns = axes_with_inertia(body, motion.turns);
-  const auto r = std::ssize(turns);
   Matrices m = matrices_of(body, motion, turns);
   const VectorXd scale = m.M.diagonal().cwiseSqrt().cwiseInverse();
   m.K = scale.asDiagonal() * m.K * scale.asDiagonal();
@@ -137,7 +136,7 @@ PrestressedBasis prestressed_modes(const Mesh& mesh, const Assembly& assembly, c
                                    const SteadyMotion& motion,
                                    const std::function<ModalBasis(int count)>& clamped_modes, int most, int modes,
                                    int threads) {
-  constexpr int bearable = 400;
+  const int first = 2 * modes + 8, bearable = most <= 2000 ? 400 : 2 * first;  // higher modes of solids take long
   constexpr double converged = 1e-6;
   require(modes >= 1 && modes <= most,
           fmt::format("prestressed: {} modes asked of a body with {} unknowns", modes, most));
@@ -146,7 +145,9 @@ PrestressedBasis prestressed_modes(const Mesh& mesh, const Assembly& assembly, c
   PrestressedShapes shapes;
   double change = 1;  // of squared frequencies
   int last = 0;
-  for (int count = std::min(4 * modes + 12, most); change > converged && last < most && count <= bearable;
+  GeometricOptions options;
+  options.threads = threads;
+  for (int count = std::min(first, most); change > converged && last < most && count <= bearable;
        count = std::min(2 * count, most)) {
     try {
       clamped = clamped_modes(count);
@@ -156,7 +157,7 @@ PrestressedBasis prestressed_modes(const Mesh& mesh, const Assembly& assembly, c
     }
     last = count;
     result.clamped = reduce(mesh, assembly, clamped, "clamped", threads);
-    result.clamped.Kg = geometric_stiffness(mesh, assembly, clamp, clamped.Phi, {.threads = threads});
+    result.clamped.Kg = geometric_stiffness(mesh, assembly, clamp, clamped.Phi, options);
     const VectorXd before = std::exchange(shapes, prestressed_shapes(result.clamped, motion, modes)).lambda;
     if (before.size() > 0) change = ((shapes.lambda - before).array() / shapes.lambda.array()).abs().maxCoeff();
   }

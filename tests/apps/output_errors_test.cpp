@@ -73,6 +73,32 @@ TEST(OutputErrors, AbsoluteErrorsOfAUnitDoNotCount) {
   EXPECT_DOUBLE_EQ(with("1 rad"), 0.5);  // another unit
 }
 
+TEST(OutputErrors, AnOutputMayHaveAnAccuracyOfItsOwn) {
+  const OutputTable a = table(hub, {0, 3, 4e-6, 0}, {1, 1, 0, 0}), b = table(hub, {0, 3, 0, 0}, {1, 1, 0, 0});
+  constexpr double tolerance = 1e-5;
+  const auto wanted = [&](const char* text) {
+    return only(compare_outputs(a, b, {text}, {.tolerance = tolerance, .length = 2}));
+  };
+  EXPECT_DOUBLE_EQ(wanted("hub.rate").error, 4e-6 / 3);
+  // Where the error is what is wanted, it is the tolerance.
+  EXPECT_DOUBLE_EQ(wanted("hub.rate 4e-6 rad/s").error, tolerance);
+  EXPECT_DOUBLE_EQ(wanted("hub.rate 8e-6 rad/s").error, tolerance / 2);
+  EXPECT_DOUBLE_EQ(wanted("hub.rate 4e-3").error, 4e-6 / 3 * tolerance / 4e-3);
+  EXPECT_EQ(wanted("hub.rate 4e-3").name, "hub.rate");
+  EXPECT_EQ(wanted("hub.rate 4e-3").size, 3);
+  for (const char* text : {"hub.rate 4e-6 rad/s", "hub.rate 4e-3"})
+    EXPECT_DOUBLE_EQ(wanted(text).error * wanted(text).scale, 4e-6) << text;
+}
+
+TEST(OutputErrors, WantedOutputsAreANameAnAccuracyAndAUnit) {
+  EXPECT_EQ(wanted_output("boom.tip").accuracy, 0);
+  EXPECT_EQ(wanted_output("boom.tip 1e-3").accuracy, 1e-3);
+  EXPECT_EQ(wanted_output("clamp.torque 2e-3 N m").unit, "N m");
+  for (const char* text : {"boom.tip ", "boom.tip x", "boom.tip 0", "boom.tip -1", "boom.tip nan", "boom.tip 1e-3 rad",
+                           "boom.tip 1e-3m", "boom.tip 1e-3 ", "boom.q 1e-3 m", "clamp.torque 1 N"})
+    EXPECT_THROW(wanted_output(text), InputError) << text;
+}
+
 TEST(OutputErrors, AbsoluteErrorsAreNumbersWithAUnit) {
   EXPECT_EQ(absolute_error("2e-3 N m").unit, "N m");
   EXPECT_EQ(absolute_error("2e-3 N m").size, 2e-3);

@@ -97,6 +97,25 @@ TEST(Planner, ARunGoesOnToBetterModelsUntilTheBudgetIsMet) {
   EXPECT_LT(r.budget.discretisation, 1e-2);
 }
 
+TEST(Planner, AnOutputWithALooserAccuracyTakesFewerModes) {
+  const auto flown = [](const std::string& tip) {
+    Scene scene = spun_about("z", 1e-5);
+    scene.outputs = {"fly.rotation", "boom.tip" + tip};
+    return run_scene(scene, {});
+  };
+  const RunResult strict = flown(""), loose = flown(" 1e-2"), absolute = flown(" 1e-2 m");
+  EXPECT_LT(loose.bodies.at(1).body.n(), strict.bodies.at(1).body.n());
+  EXPECT_TRUE(strict.budget.within(1e-5));
+  EXPECT_TRUE(loose.budget.within(1e-5));
+  EXPECT_LE(absolute.bodies.at(1).body.n(), loose.bodies.at(1).body.n());
+  for (const RunResult* r : {&loose, &absolute}) {
+    const OutputTable &few = r->outputs, &many = strict.outputs;
+    EXPECT_LE(largest(compare_outputs(few, many, {"fly.rotation"})), 1e-5);
+    EXPECT_GT(largest(compare_outputs(few, many, {"boom.tip"})), 1e-5);
+  }
+  EXPECT_LE(largest(compare_outputs(loose.outputs, strict.outputs, {"boom.tip"})), 1e-2);
+}
+
 TEST(Planner, WithoutABudgetCandidatesAreEnoughWhereFewerAre) {
   Scene easy = spun_about("z", 1e-2), hard = spun_about("z", 1e-12);
   easy.error_budget = hard.error_budget = false;

@@ -33,7 +33,9 @@ ReducedBody stiffened(const Model& model, const ModalBasis& basis) {
 }
 
 ModalBasis held(const Model& model, int count) {
-  return clamped_modes(model.mesh, model.assembly, model.clamp, {.num_modes = count});
+  EigenOptions options;
+  options.num_modes = count;
+  return clamped_modes(model.mesh, model.assembly, model.clamp, options);
 }
 
 PrestressedBasis prestressed(const Model& model, const SteadyMotion& motion, int modes) {

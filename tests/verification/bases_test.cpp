@@ -91,7 +91,7 @@ struct Basis {
 // the many modes that they need. The frames differ by the square of the deflection, which is 1e-5 of the motion here.
 constexpr Basis bases[] = {
     {"hinge", "basis = \"hinge\"\nmodes = 3\ncorrections = [\"tip.Fy\"]"},
-    {"prestressed", "basis = \"prestressed\"\nmodes = 5"},
+    {"prestressed", "basis = \"prestressed\"\nmodes = 6\ncorrections = [\"tip.Fy\"]"},
     {"craig-bampton", "basis = \"craig-bampton\"\nmodes = 4"},
     {"orthonormal craig-bampton", "basis = \"craig-bampton\"\nmodes = 4\northonormal = true"},
     {"craig-bampton carried at its tip", "basis = \"craig-bampton\"\nmodes = 4\nreference = \"tip\""},

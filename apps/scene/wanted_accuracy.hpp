@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+
+namespace flexboom {
+
+/// An error that does not count, of all outputs of a unit: "1e-9 rad".
+struct AbsoluteError {
+  double size = 0;
+  std::string unit;  // one of output_units
+};
+inline constexpr std::array<std::string_view, 6> output_units = {"rad", "rad/s", "m", "m/s", "N", "N m"};
+
+/// @throws InputError for anything but a number above zero and one of the units.
+AbsoluteError absolute_error(const std::string& text);
+
+/// An output whose errors count: "hub.rotation", "hub.rotation 1e-4" or "hub.rotation 1e-9 rad".
+struct WantedOutput {
+  std::string name;
+  double accuracy = 0;  // 0: that of the scene; else relative, or absolute where there is a unit
+  std::string unit{};   // that of the output
+};
+
+/// @throws InputError for anything else, and for a unit that is not that of the output.
+WantedOutput wanted_output(const std::string& text);
+
+/// "m/s" of "hub.velocity"; empty of elastic coordinates, drives and energies.
+std::string_view unit_of(const std::string& output);
+
+}  // namespace flexboom
