@@ -2,6 +2,7 @@
 
 #include "fem/base/check.hpp"
 #include "fem/base/round_off.hpp"
+#include "reduction/body/tilde.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -140,9 +141,7 @@ void validate_stiffening(const ReducedBody& body, const Checker& c) {
   }
 }
 
-// For W = sum dm a b^T:  sum dm a x b  is its axial vector, and  -sum dm (tilde(a) tilde(b) + tilde(b) tilde(a)) / 2 =
-// tr W I - sym W.
-Eigen::Vector3d axial(const Eigen::Matrix3d& W) { return {W(1, 2) - W(2, 1), W(2, 0) - W(0, 2), W(0, 1) - W(1, 0)}; }
+/// -sum dm (tilde(a) tilde(b) + tilde(b) tilde(a)) / 2 = tr W I - sym W of W = sum dm a b^T.
 Eigen::Matrix3d inertia_of(const Eigen::Matrix3d& W) {
   return W.trace() * Eigen::Matrix3d::Identity() - (W + W.transpose()) / 2;
 }

@@ -11,4 +11,9 @@ inline Eigen::Matrix3d tilde(const Eigen::Vector3d& a) {
   return A;
 }
 
+/// sum dm a x b of W = sum dm a b^T.
+inline Eigen::Vector3d axial(const Eigen::Matrix3d& W) {
+  return {W(1, 2) - W(2, 1), W(2, 0) - W(0, 2), W(0, 1) - W(1, 0)};
+}
+
 }  // namespace flexboom

@@ -50,9 +50,6 @@ class Moments {
   MatrixXd products_;
 };
 
-/// sum dm a x b of W = sum dm a b^T.
-Vector3d axial(const Matrix3d& W) { return {W(1, 2) - W(2, 1), W(2, 0) - W(0, 2), W(0, 1) - W(1, 0)}; }
-
 struct Matrices {
   MatrixXd K, M;
 };
