@@ -32,7 +32,7 @@ DisplayShape box_of(const ReducedBody& body, const Vector3d& size) {
   Vector3d sides = size;
   if (size.isZero(0)) {
     const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(
-        body.J0 - body.m * (centre.squaredNorm() * Matrix3d::Identity() - centre * centre.transpose()));
+        Matrix3d(body.J0 - body.m * (centre.squaredNorm() * Matrix3d::Identity() - centre * centre.transpose())));
     const Vector3d& J = principal.eigenvalues();
     axes = principal.eigenvectors();
     // J_i = m (a_j^2 + a_k^2) / 12

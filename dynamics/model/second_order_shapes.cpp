@@ -54,7 +54,7 @@ std::vector<Vector4d> affine_functions(const Eigen::Matrix4d& gram) {
   const double m = gram(0, 0);
   const Vector3d centre = gram.block<3, 1>(1, 0) / m;
   const Matrix3d about_origin = gram.bottomRightCorner<3, 3>();
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(about_origin - m * centre * centre.transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(Matrix3d(about_origin - m * centre * centre.transpose()));
   std::vector<Vector4d> functions = {Vector4d::Unit(0)};
   for (Index i = 0; i < 3; ++i) {
     const double extension = principal.eigenvalues()[i];

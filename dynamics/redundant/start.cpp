@@ -125,7 +125,7 @@ std::string body_without_inertia(Equations& e, double t, const double* y) {
   if (rows.cols() > 0) free = Eigen::ColPivHouseholderQR<MatrixXd>(rows).householderQ() * free;
   free = (root.asDiagonal() * free.rightCols(n - rows.cols())).eval();
   if (free.cols() == 0) return "";
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> inertia(free.transpose() * mass_matrix(e, y) * free);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> inertia(MatrixXd(free.transpose() * mass_matrix(e, y) * free));
   const VectorXd& of = inertia.eigenvalues();
   if (of(0) > enough * of(of.size() - 1)) return "";
   const VectorXd motion = (free * inertia.eigenvectors().col(0)).cwiseQuotient(root);
@@ -222,7 +222,8 @@ double Equations::project(double t, VectorXd& y) {
   RowValues values;
   const VectorXd root = inverse_metric_.cwiseSqrt();
   const auto solve = [&](const VectorXd& against) {  // least D^1/2 x with G x = - against
-    const Eigen::ColPivHouseholderQR<MatrixXd> qr(root.asDiagonal() * kept_gradient(*this, t, y.data()).transpose());
+    const Eigen::ColPivHouseholderQR<MatrixXd> qr(
+        MatrixXd(root.asDiagonal() * kept_gradient(*this, t, y.data()).transpose()));
     const Index rank = qr.cols();
     VectorXd z = qr.colsPermutation().transpose() * VectorXd(-against);
     z = qr.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>().transpose().solve(z);

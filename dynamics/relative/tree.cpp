@@ -108,7 +108,8 @@ void check_inertia(const Tree& system, const tree::Model& model) {
     Matrix3d c;
     for (int r = 0; r < 3; ++r) c.row(r) = spatial::eigen(s.I.tw.row[static_cast<size_t>(r)]).transpose();
     const Matrix3d left = J - c.transpose() * mass.ldlt().solve(c);
-    const double least = Eigen::SelfAdjointEigenSolver<Matrix3d>((left + left.transpose()) / 2).eigenvalues()(0);
+    const double least =
+        Eigen::SelfAdjointEigenSolver<Matrix3d>(Matrix3d((left + left.transpose()) / 2)).eigenvalues()(0);
     require(least > too_little * J.trace() && mass.allFinite(),
             fmt::format("joint {}: with everything on it, body {} has an inertia of {:.3g} of {:.3g} kg m^2 about one "
                         "axis: too little to compute with",

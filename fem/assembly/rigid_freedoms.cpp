@@ -99,7 +99,7 @@ int rigid_freedoms(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp) {
   add_constraints(of_held, constraint_rows(mesh, dofs), motions, held);
   // Motions that move nothing (the spin of a line mass) are no freedoms.
   const auto null_space = [](const Gram& gram) {
-    const Eigen::SelfAdjointEigenSolver<Gram> solver(gram, Eigen::EigenvaluesOnly);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(MatrixXd(gram), Eigen::EigenvaluesOnly);
     return static_cast<int>((solver.eigenvalues().array() <= 1e-12 * std::max(1.0, gram.trace())).count());
   };
   return null_space(of_held) - null_space(of_all);

@@ -41,7 +41,7 @@ MatrixXd static_shapes(const Mesh& mesh, const Assembly& assembly, const Clamp& 
 
 /// Part of u that is M-orthogonal to the shapes X, whose M X and Me are given.
 VectorXd orthogonal_part(const MatrixXd& X, const MatrixXd& M_X, const Eigen::LDLT<MatrixXd>& Me, VectorXd u) {
-  for (int pass = 0; pass < 2; ++pass) u -= X * Me.solve(M_X.transpose() * u);
+  for (int pass = 0; pass < 2; ++pass) u -= X * Me.solve(VectorXd(M_X.transpose() * u));
   return u;
 }
 
@@ -68,7 +68,7 @@ ModalBasis with_attachment_modes(ModalBasis basis, const Mesh& mesh, const Assem
   for (size_t i = 0; i < loads.size(); ++i) {
     const VectorXd u = U.col(static_cast<Index>(i));
     const MatrixXd M_Phi = symmetric_product(assembly.M, basis.Phi);
-    const Eigen::LDLT<MatrixXd> Me(basis.Phi.transpose() * M_Phi);
+    const Eigen::LDLT<MatrixXd> Me(MatrixXd(basis.Phi.transpose() * M_Phi));
     const VectorXd own = orthogonal_part(basis.Phi, M_Phi, Me, u);
     const double norm = std::sqrt(quadratic_form(assembly.M, own)(0, 0));
     // What solvers leave of a shape that is in the span already is 1e-10 of it.

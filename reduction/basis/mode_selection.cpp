@@ -111,7 +111,7 @@ MatrixXd effective_masses(const ReducedBody& body) {
 std::vector<int> modes_by_effective_mass(const ReducedBody& body, double fraction, const std::vector<int>& directions) {
   require_fraction(fraction);
   const MatrixXd effective = effective_masses(body);
-  const Matrix6d M_r = rigid_mass(body);
+  const MatrixXd M_r = rigid_mass(body);
   std::set<int> taken;
   for (const int d : directions) {
     require(d >= 0 && d < 6, fmt::format("modes: direction {} does not exist; there are 0 to 5", d));
@@ -126,12 +126,12 @@ std::vector<int> modes_by_effective_mass(const ReducedBody& body, double fractio
 
 VectorXd completeness_indices(const ReducedBody& body) {
   // Rotations scaled to the body, and the directions that have inertia.
-  Matrix6d M_r = rigid_mass(body);
+  MatrixXd M_r = rigid_mass(body);
   Eigen::Vector<double, 6> scale;
   scale << Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(std::sqrt(body.m / body.J0.trace()));
   M_r = scale.asDiagonal() * M_r * scale.asDiagonal();
   const MatrixXd L = scale.asDiagonal() * rigid_coupling(body);
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(M_r);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(M_r);
   VectorXd index = VectorXd::Zero(body.n());
   int motions = 0;
   for (int i = 0; i < 6; ++i) {

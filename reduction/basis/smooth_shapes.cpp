@@ -36,7 +36,7 @@ Legendre legendre(int degree, double s) {
 struct BodyAxes {
   explicit BodyAxes(const Matrix3Xd& nodes) : centre(nodes.rowwise().mean()) {
     const Matrix3Xd d = nodes.colwise() - centre;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(d * d.transpose());
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(Eigen::Matrix3d(d * d.transpose()));
     axes = eigen.eigenvectors().rowwise().reverse();
     half_length = (axes.col(0).transpose() * d).cwiseAbs().maxCoeff();
     half_width = (axes.rightCols<2>().transpose() * d).colwise().norm().maxCoeff();

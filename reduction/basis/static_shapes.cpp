@@ -74,7 +74,7 @@ std::vector<int> determinate_support(const Mesh& mesh, const DofMap& dofs, const
   const std::vector<char> strained = strained_freedoms(mesh, dofs);
   std::vector<int> freedoms = left.free_dofs();
   std::erase_if(freedoms, [&strained](int dof) { return !strained[static_cast<size_t>(dof)]; });
-  const Eigen::ColPivHouseholderQR<MatrixXd> qr(T(freedoms, Eigen::all).transpose());
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(MatrixXd(T(freedoms, Eigen::all).transpose()));
   std::vector<int> support;
   for (Index i = 0; i < qr.rank(); ++i) {
     const int dof = freedoms[static_cast<size_t>(qr.colsPermutation().indices()(i))];

@@ -17,7 +17,7 @@ MassPoints mass_points(const MatrixXd& gram) {
   // Rows of unit size, since metres and shapes differ by powers of ten; a row of zeros stays one.
   const VectorXd scale = gram.diagonal().cwiseMax(0).cwiseSqrt();
   const VectorXd inverse = scale.unaryExpr([](double s) { return s > 0 ? 1 / s : 0; });
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(inverse.asDiagonal() * gram * inverse.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(inverse.asDiagonal() * gram * inverse.asDiagonal()));
   const VectorXd& lambda = eigen.eigenvalues();
   // What is below the round-off of the decomposition is no direction of the body.
   const double least = static_cast<double>(gram.rows()) * 2.2e-16 * lambda(lambda.size() - 1);

@@ -150,7 +150,7 @@ class BlockLanczos {
   }
 
   Ritz ritz_pairs() const {
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(T_.topLeftCorner(expanded_, expanded_));
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(T_.topLeftCorner(expanded_, expanded_)));
     Ritz ritz;
     ritz.theta = eigen.eigenvalues().reverse();
     ritz.S = eigen.eigenvectors().rowwise().reverse();

@@ -14,14 +14,15 @@ namespace flexboom {
 EigenPairs dense_modes(const EigenProblem& problem, const SparseFactor&, const EigenRequest& request) {
   const double sigma = request.sigma;
   const Eigen::MatrixXd M = Eigen::MatrixXd(problem.M).selfadjointView<Eigen::Lower>();
-  const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::MatrixXd(problem.K) - sigma * M);  // reads the lower triangle
+  const Eigen::LLT<Eigen::MatrixXd> llt(
+      Eigen::MatrixXd(Eigen::MatrixXd(problem.K) - sigma * M));  // reads the lower triangle
   if (llt.info() != Eigen::Success) {
     throw NumericalError("dense: K - sigma M is not positive definite, the shift is not below the lowest eigenvalue");
   }
   const auto L = llt.matrixL();
   Eigen::MatrixXd C = L.solve(M);
   C = L.solve(C.transpose().eval());
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen((C + C.transpose()) / 2);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd((C + C.transpose()) / 2));
   if (eigen.info() != Eigen::Success) throw NumericalError("dense: the QR algorithm did not converge");
 
   const Eigen::VectorXd nu = eigen.eigenvalues().reverse();

@@ -30,7 +30,7 @@ VectorXd norms(const MatrixXd& W, const MatrixXd& M_W) {
 MatrixXd well_apart(const MatrixXd& G, double cut) {
   const VectorXd length = G.diagonal().cwiseMax(0).cwiseSqrt();
   const VectorXd D = length.unaryExpr([cut](double x) { return x > cut ? 1 / x : 0; });
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(D.asDiagonal() * G * D.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(D.asDiagonal() * G * D.asDiagonal()));
   const VectorXd& w = eigen.eigenvalues();
   const Index kept = (w.array() > independent * w(w.size() - 1)).count();
   if (!(w(w.size() - 1) > 0)) return MatrixXd::Zero(G.rows(), 0);

@@ -87,7 +87,7 @@ class Search {
     const MatrixXd energy = X.transpose() * load_(Eigen::all, outside);
     load_.resize(load_.rows(), 0);
     if (outside.empty()) return;
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen((energy + energy.transpose()) / 2);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd((energy + energy.transpose()) / 2));
     const VectorXd& w = eigen.eigenvalues();
     const Index rank = (w.array() > 1e-10 * w(w.size() - 1)).count();
     const MatrixXd Y = X * eigen.eigenvectors().rightCols(rank) * w.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();

@@ -36,7 +36,7 @@ VectorXd eigenvalues(const MatrixXd& Me, const MatrixXd& Ke) {
 /// C A^-1 C^T.
 MatrixXd through(const MatrixXd& A, const MatrixXd& C) {
   if (A.size() == 0) return MatrixXd::Zero(C.rows(), C.rows());
-  return C * Eigen::LDLT<MatrixXd>(A).solve(C.transpose());
+  return C * Eigen::LDLT<MatrixXd>(A).solve(MatrixXd(C.transpose()));
 }
 
 MatrixXd stacked(const Eigen::Matrix3Xd& top, const Eigen::Matrix3Xd& bottom) {

@@ -51,8 +51,8 @@ void add_bessel(std::vector<BodyCheck>& checks, const ReducedBody& body) {
   const MatrixXd M = rigid_mass(body);
   // Scaled so that kilograms and their moments weigh alike.
   const VectorXd scale = M.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const MatrixXd left = M - C * Eigen::LDLT<MatrixXd>(body.Me).solve(C.transpose());
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale.asDiagonal() * left * scale.asDiagonal(),
+  const MatrixXd left = M - C * Eigen::LDLT<MatrixXd>(body.Me).solve(MatrixXd(C.transpose()));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(MatrixXd(scale.asDiagonal() * left * scale.asDiagonal()),
                                                       Eigen::EigenvaluesOnly);
   const double lowest = eigen.eigenvalues()(0);
   BodyCheck left_over =
