@@ -22,7 +22,7 @@ struct Axis {
   double fraction(double v) const { return ((log ? std::log10(v) : v) - low) / (high - low); }
 };
 
-Axis axis_of(const std::vector<Curve>& curves, bool of_x, bool log) {
+Axis plot_axis(const std::vector<Curve>& curves, bool of_x, bool log) {
   Axis a{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(), log};
   for (const Curve& c : curves)
     for (const double v : of_x ? c.x : c.y) {
@@ -86,7 +86,7 @@ std::string escaped(const std::string& s) {
 }
 
 std::string svg(const Plot& p) {
-  const Axis ax = axis_of(p.curves, true, p.log_x), ay = axis_of(p.curves, false, p.log_y);
+  const Axis ax = plot_axis(p.curves, true, p.log_x), ay = plot_axis(p.curves, false, p.log_y);
   const double w = p.width - left - right, h = p.height - top - bottom;
   const auto px = [&](double fraction) { return left + w * fraction; };
   const auto py = [&](double fraction) { return top + h * (1 - fraction); };

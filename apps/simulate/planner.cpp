@@ -27,7 +27,7 @@ namespace {
 constexpr double unmoved = 1e-10;  // of the largest displacement: round-off of one that is zero
 constexpr int fewest = 4;          // candidates per body
 constexpr int most_trials = 6;     // runs with fewer modes
-constexpr int most_steps = 3;      // improvements
+constexpr int most_rounds = 3;     // improvements
 constexpr int most_doublings = 2;  // of the candidates, where no budget shows what they leave out
 
 bool stopped(const RunHooks& hooks) { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
@@ -56,6 +56,7 @@ std::string counted(const std::vector<std::string>& kinds) {
   std::map<std::string, int> count;
   for (const std::string& kind : kinds) ++count[kind];
   std::vector<std::string> parts;
+  parts.reserve(count.size());
   for (const auto& [kind, n] : count) parts.push_back(fmt::format("{} {}", n, kind));
   return parts.empty() ? "none" : fmt::format("{}", fmt::join(parts, ", "));
 }
@@ -225,7 +226,7 @@ bool Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::
 bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {
   const OutputErrors* worst = budget.worst();
   if (open_.empty() || !budget.measured || budget.within(scene.tolerance) || worst == nullptr || stopped(hooks) ||
-      steps_++ >= most_steps)
+      steps_++ >= most_rounds)
     return false;
   const auto known = [](double part) { return std::isnan(part) ? 0 : part; };
   const double truncation = known(worst->truncation), discretisation = known(worst->discretisation);

@@ -275,8 +275,8 @@ void set_flown(const Scene& scene, TreeTrajectory flight, Run& r) {
 }  // namespace
 
 std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& bodies) {
-  if (std::ranges::none_of(bodies.bodies, has_stiffening))
-    return std::vector<Stiffening>(bodies.bodies.size(), Stiffening::off);
+  std::vector<Stiffening> none(bodies.bodies.size(), Stiffening::off);
+  if (std::ranges::none_of(bodies.bodies, has_stiffening)) return none;
   const Tree plain(bodies);
   std::vector<Stiffening> choice =
       stiffening_where_it_counts(bodies, plain.unpack(first_state(scene, plain)), scene.duration, scene.tolerance);

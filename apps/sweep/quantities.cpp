@@ -70,7 +70,7 @@ Quantity quantity_of(const std::string& text) {
   Quantity q;
   q.name = text;
   if (!text.starts_with("settle:")) {
-    const auto kind = std::find(kinds.begin(), kinds.end(), behind);
+    const auto* const kind = std::find(kinds.begin(), kinds.end(), behind);
     require(kind != kinds.end(), usage);
     q.output = text.substr(0, last);
     q.kind = static_cast<Quantity::Kind>(kind - kinds.begin());

@@ -49,7 +49,7 @@ std::vector<PathStep> path_steps(const std::string& path) {
   while (!rest.empty()) {
     if (rest.front() == '[') {
       const size_t end = rest.find(']');
-      if (end == rest.npos) refuse_path(path, "a bracket is not closed");
+      if (end == std::string_view::npos) refuse_path(path, "a bracket is not closed");
       steps.push_back(bracket_step(path, rest.substr(1, end - 1)));
       rest.remove_prefix(end + 1);
     } else {
@@ -119,7 +119,7 @@ class PathWalk {
     const auto here = [&] { return place.empty() ? std::string("the scene") : "\"" + place + "\""; };
     if (step.key.empty()) refuse_path(path_, fmt::format("{} is no array", here()));
     if (value.kind != Value::Kind::table) refuse_path(path_, fmt::format("{} is no table", here()));
-    Value* below = const_cast<Value*>(entry_of(value, step.key));  // of a table that may be changed
+    auto* below = const_cast<Value*>(entry_of(value, step.key));  // of a table that may be changed
     if (below == nullptr) below = absent_(value, step.key, depth + 1 == steps_.size());
     if (below != nullptr) walk(*below, depth + 1, place.empty() ? step.key : place + "." + step.key);
   }

@@ -26,7 +26,7 @@ struct SweepRequest {
 };
 
 /// How a sweep ended.
-struct SweepEnd {
+struct SweepEnd {  // NOLINT(bugprone-exception-escape): a value of JSON is moved without one
   nlohmann::ordered_json summary;
   size_t failed = 0;  // runs
   bool interrupted = false;

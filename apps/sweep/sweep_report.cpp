@@ -138,7 +138,7 @@ std::string scatter_dots(const ScatterColumn& x, const ScatterColumn& y, double 
       size, size);
   for (size_t i = 0; i < x.values.size(); i += x.values.size() / most + 1) {
     if (!std::isfinite(x.values[i]) || !std::isfinite(y.values[i])) continue;
-    s += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"1.3\" fill=\"#0072b2\"/>",
+    s += fmt::format(R"(<circle cx="{:.1f}" cy="{:.1f}" r="1.3" fill="#0072b2"/>)",
                      left + size * (0.04 + 0.92 * (x.values[i] - x.low) / (x.high - x.low)),
                      top + size * (0.96 - 0.92 * (y.values[i] - y.low) / (y.high - y.low)));
   }

@@ -20,7 +20,7 @@ namespace {
 std::string csv_text(std::string text) {
   for (char& c : text)
     if (c == '\n' || c == '\r') c = ' ';
-  if (text.find_first_of(",\"") == text.npos) return text;
+  if (text.find_first_of(",\"") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
   return quoted + '"';

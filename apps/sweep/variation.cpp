@@ -22,7 +22,7 @@ std::vector<std::string> split_at(std::string_view text, char sign) {
   for (;;) {
     const size_t end = text.find(sign);
     parts.emplace_back(text.substr(0, end));
-    if (end == text.npos) return parts;
+    if (end == std::string::npos) return parts;
     text.remove_prefix(end + 1);
   }
 }
@@ -62,7 +62,7 @@ void fill_distribution(const std::string& of, const std::vector<std::string>& pa
 
 Sampling sampling_of(const SweepDesign& design, bool all_lists) {
   if (design.sample.empty()) return design.indices ? Sampling::sobol : all_lists ? Sampling::grid : Sampling::random;
-  const auto name = std::find(sampling_names.begin(), sampling_names.end(), design.sample);
+  const auto* const name = std::find(sampling_names.begin(), sampling_names.end(), design.sample);
   require(name != sampling_names.end(), "--sample " + toml_reader::not_among(design.sample, sampling_names));
   return static_cast<Sampling>(name - sampling_names.begin());
 }
@@ -125,7 +125,7 @@ KeyVariant Variation::at(double u) const {
 
 Variation variation_of(const std::string& text) {
   const size_t sign = text.find('=');
-  require(sign != text.npos && sign > 0 && sign + 1 < text.size(),
+  require(sign != std::string::npos && sign > 0 && sign + 1 < text.size(),
           fmt::format("--vary {}: is written KEY=SPEC, for example hub.mass=8,9,10", text));
   Variation v;
   v.name = text.substr(0, sign);
