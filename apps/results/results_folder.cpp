@@ -120,6 +120,7 @@ bool on_grid(double t, double step) {
 ResultsFolder::ResultsFolder(fs::path path, const Scene& scene, const fs::path& input)
     : path_(std::move(path)), goes_on_(scene.from && same_file(scene.from->file(), path_ / "state.toml")) {
   if (scene.from) start_ = scene.from->time();
+  if (goes_on_) kept_events_ = scene.from->events();
   goes_on_ ? check_earlier_run(path_) : check_inputs(path_, scene, input);
   std::error_code error;
   fs::create_directories(path_, error);
@@ -155,7 +156,9 @@ void ResultsFolder::begin(const RunResult& r) {
   require(head.header == header,
           fmt::format("--continue: {} has other columns than this run; give another folder by --out", rows.string()));
   rows_before_ = head.bytes;
-  events_before_ = head_of(path_ / "events.csv", true, [this](double t) { return t <= start_; }).rows;
+  // Not by their times: of two at the time of the state, one may be in it and one may be what a killed run saw next.
+  events_before_ =
+      head_of(path_ / "events.csv", true, [left = kept_events_](double) mutable { return left-- > 0; }).rows;
   skips_first_ = start_ > 0 && !on_grid(start_, r.scene.output_step);
   const fs::path frames = path_ / "motion.pvd";
   if (fs::exists(frames)) {
@@ -189,7 +192,7 @@ void ResultsFolder::add(const RunResult& r, size_t first) {
   }
   append(events, [&](std::ostream& out) { out << event_rows(r, std::exchange(events_, all.size())); });
   if (r.scene.vtu_step > 0) write_motion(r, path_, frames_);
-  write_file(path_ / "state.toml", to_toml(r.end, r.scene.name));
+  write_state(r);
   summary_ = summary_json(r, 0);
   summary_["status"] = "running";
   summary_["process"] = getpid();
@@ -210,7 +213,13 @@ void ResultsFolder::write(const RunResult& r) {
   summary_ = summary_json(r, watch.seconds());
   write_summary();
   // Last: until everything is there, the state before says from where a run that is killed now can go on.
-  write_file(path_ / "state.toml", to_toml(r.end, r.scene.name));
+  write_state(r);
+}
+
+void ResultsFolder::write_state(const RunResult& r) {
+  FlightState end = r.end;
+  end.events = kept_events_ + static_cast<int>(r.trajectory.events.size());
+  write_file(path_ / "state.toml", to_toml(end, r.scene.name));
 }
 
 void ResultsFolder::write_summary() { write_file(path_ / "summary.json", summary_.dump(2) + "\n"); }

@@ -41,6 +41,7 @@ class ResultsFolder {
   void begin(const RunResult&);
   void write_rows(std::ostream&, const OutputTable&, size_t first) const;
   void write_summary();
+  void write_state(const RunResult&);
 
   std::filesystem::path path_;
   bool goes_on_;              // from this folder
@@ -49,7 +50,8 @@ class ResultsFolder {
   double start_ = 0;          // [s]
   std::unique_ptr<FolderLock> lock_;
   std::uintmax_t rows_before_ = 0;  // bytes of trajectory.csv that an earlier flight wrote
-  std::string events_before_;
+  std::string events_before_;       // rows of it
+  int kept_events_ = 0;             // of them
   MotionFrames frames_before_, frames_;
   size_t events_ = 0;  // written of this flight
   nlohmann::ordered_json summary_;

@@ -28,7 +28,7 @@ using toml_writer::toml;
 
 namespace {
 
-constexpr std::string_view state_format = "flexboom-state-3";
+constexpr std::string_view state_format = "flexboom-state-4";
 constexpr std::string_view checksum_key = "sha256";
 
 /// The line that holds the checksum of all others, or an empty one behind the end.
@@ -115,6 +115,7 @@ std::string to_toml(const FlightState& state, const std::string& scene) {
   out.key("version", std::string_view(version));
   out.key(checksum_key, std::string_view());
   out.key("time", state.time, "[s]");
+  out.key("events", state.events, "in events.csv, until then");
   out.table("[modes]");
   for (const auto& [body, n] : state.modes) out.key(toml(body), n);
   if (!state.shapes.empty()) out.table("[shapes]");
@@ -149,6 +150,7 @@ struct SavedState::Content {
   fs::path file;
   Value root;
   double time = 0;
+  int events = 0;
   std::map<std::string, int> modes;
   std::map<std::string, std::vector<int>> shapes;
   std::map<std::string, StopHistory> stops;
@@ -226,6 +228,8 @@ SavedState SavedState::read(const fs::path& path, bool changed_too) {
   table.text(checksum_key, "");
   content->time = table.number("time");
   if (!(content->time >= 0 && std::isfinite(content->time))) table.fault("time", "must be a time after the start [s]");
+  content->events = table.integer("events");
+  if (content->events < 0) table.fault("events", "must be a number of rows");
   if (std::optional<TableReader> modes = table.table("modes", true))
     for (const auto& [body, value] : modes->value().entries) {
       content->modes[body] = modes->integer(body);
@@ -276,6 +280,8 @@ const fs::path& SavedState::file() const { return content_->file; }
 double SavedState::time() const { return content_->time; }
 const std::map<std::string, int>& SavedState::modes() const { return content_->modes; }
 const std::map<std::string, std::vector<int>>& SavedState::shapes() const { return content_->shapes; }
+int SavedState::events() const { return content_->events; }
+
 const MotionScales& SavedState::largest() const { return content_->largest; }
 
 VectorXd SavedState::values(const std::vector<std::string>& names) const {
