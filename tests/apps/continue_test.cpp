@@ -3,6 +3,7 @@
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -70,6 +71,19 @@ TEST_P(Continue, SportIsTheSameRunInTwoFlights) {
   EXPECT_EQ(later.trajectory.time.front(), 0.2137);
   expect_same(whole, first, later, relative ? 1e-8 : 1e-5, relative ? 1e-9 : 1e-6);
   EXPECT_LT(later.trajectory.summary.energy_balance, relative ? 1e-8 : 1e-5);
+}
+
+// A boom's ring after a bounce is over before a long step looks for the first time, and shakes the others all the same.
+TEST(GoingOn, AtAnyPhaseOfARing) {
+  Scene fine = scene_named("sport-calibration"), coarse = fine;
+  fine.tolerance = 1e-9, coarse.tolerance = 1e-6;
+  const RunResult whole = fly(fine, 20);
+  for (int k = 0; k < 40; ++k) {
+    const double end = 15.5 + 0.02 * k;
+    const RunResult first = fly(fine, end), later = fly(coarse, 20, &first);
+    for (const char* joint : {"efield_plus", "efield_minus", "sip", "slp"})
+      EXPECT_LT(difference(whole, later, fmt::format("{}.rate", joint)), 5e-6) << end;
+  }
 }
 
 TEST_P(Continue, FlexibleBodiesOnJoints) {
