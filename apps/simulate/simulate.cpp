@@ -174,6 +174,16 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
                                3 * std::pow(scene.orbit->rate(), 2)));
 }
 
+/// Errors that no budget measures still show in what the motion conserves.
+void warn_of_the_balance(const IntegrationSummary& s, RunResult& r) {
+  constexpr double allowed = 10;  // times the tolerance: the factor that a run without a budget promises
+  if (s.energy_balance > allowed * r.scene.tolerance || s.momentum_drift > allowed * r.scene.tolerance)
+    r.warnings.push_back(
+        fmt::format("{}: more than ten times the tolerance, {:.1e}, so outputs may be off by as much; "
+                    "a smaller tolerance helps, and an error budget measures them",
+                    balances(s), r.scene.tolerance));
+}
+
 /// What a user must not overlook.
 void add_warnings(const Run& run, RunResult& r) {
   constexpr double small = 0.1;  // of its length: beyond, shapes are no longer those of a straight body
@@ -185,6 +195,7 @@ void add_warnings(const Run& run, RunResult& r) {
                       run.bodies[i].body.name, b.size, b.time, 100 * b.of_length));
   for (const std::vector<std::string>& more : {run.motion.warnings, softening_warnings(with_joints(r.scene), run)})
     r.warnings.insert(r.warnings.end(), more.begin(), more.end());
+  if (!r.budget.measured) warn_of_the_balance(run.motion.summary, r);
   if (!r.budget.measured || r.budget.within(r.scene.tolerance)) return;
   const std::string why =
       r.budget.missing.empty()

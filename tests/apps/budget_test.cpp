@@ -97,6 +97,37 @@ TEST_P(Budget, NotAskedForIsNotMet) {
   for (const auto& [part, value] : summary["error_budget"].items()) EXPECT_TRUE(value.is_null()) << part;
 }
 
+// A stiff boom that rings undamped: the method by multipliers damps it far faster than asked, and says so.
+TEST(NoBudget, AnUnbalancedMotionIsWarnedOf) {
+  Scene scene = parse_scene(R"(format = "flexboom-scene-1"
+name = "ringing"
+duration = 0.2
+output_step = 0.01
+accuracy = { budget = false }
+[[bodies]]
+name = "boom"
+modes = 8
+stiffening = "on"
+segments = [{ shape = "round-bar", diameter = 0.01, length = 1.0, material = { E = 70e9, nu = 0.33, rho = 2700 } }]
+attachments = [{ name = "load", position = "tip", mass = 0.5 }]
+[[joints]]
+name = "hinge"
+kind = "hinge"
+b = { body = "boom", marker = "root" }
+stiffness = 50
+start = 0.05
+)",
+                            "ringing.toml");
+  const auto is_warned_of = [](const RunResult& r) {
+    return std::ranges::any_of(r.warnings, [](const std::string& w) { return w.starts_with("energy balance "); });
+  };
+  EXPECT_FALSE(is_warned_of(run_scene(scene, {})));
+  scene.formulation = "multipliers";
+  const RunResult r = run_scene(scene, {});
+  EXPECT_GT(r.trajectory.summary.energy_balance, 10 * scene.tolerance);
+  EXPECT_TRUE(is_warned_of(r));
+}
+
 // A boom whose hub spins: what the hub's equations leave out adds up over the flight, beyond (Omega / omega_1)^2.
 TEST(BudgetOfAHub, CountsWhatGeometricStiffnessChanges) {
   const std::string soft =
