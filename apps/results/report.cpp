@@ -117,6 +117,20 @@ bool is_part(std::string_view column, std::string_view part) {
   return part.ends_with('.') ? column.find(part) != std::string_view::npos : column.ends_with(part);
 }
 
+/// Curves that would be a line on the axis beside the largest.
+void leave_out_flat_ones(Plot& plot) {
+  constexpr double flat = 1e-3;
+  const auto size = [](const Curve& c) {
+    double largest = 0;
+    for (const double v : c.y) largest = std::max(largest, std::abs(v));
+    return largest;
+  };
+  double largest = 0;
+  for (const Curve& c : plot.curves) largest = std::max(largest, size(c));
+  const size_t count = std::erase_if(plot.curves, [&](const Curve& c) { return size(c) < flat * largest; });
+  if (count > 0) plot.title += fmt::format(" ({} flat {} left out)", count, count == 1 ? "curve" : "curves");
+}
+
 /// Columns that stay zero are left out.
 std::vector<Plot> plots(const Folder& f) {
   std::map<std::string, double> stops;  // angles [rad], by column
@@ -135,6 +149,7 @@ std::vector<Plot> plots(const Folder& f) {
       Curve& curve = plot.curves.emplace_back(Curve{name, t, {}});
       for (const double v : column(i)) curve.y.push_back(p.factor * (v - zero));
     }
+    leave_out_flat_ones(plot);
     if (!plot.curves.empty()) all.push_back(std::move(plot));
   }
   return all;
