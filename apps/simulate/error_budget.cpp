@@ -21,6 +21,22 @@ Scene with_more_modes(Scene scene, int times) {
   return scene;
 }
 
+Scene without_kinds(Scene scene, const StillKinds& still, const RunHooks& hooks) {
+  for (BodyScene& b : scene.bodies) {
+    const auto kinds = still.find(b.name);
+    if (kinds == still.end() || kinds->second.empty()) continue;
+    const PreparedBody p = prepared(b, 0, scene.bodies_kept_in, hooks);
+    std::vector<int> moving;
+    for (size_t k = 0; k < p.body.coordinates.size(); ++k)
+      if (!kinds->second.contains(p.body.coordinates[k].kind))
+        moving.push_back(p.shapes.empty() ? static_cast<int>(k) + 1 : p.shapes[k]);
+    if (moving.size() == p.body.coordinates.size()) continue;
+    b.shapes = std::move(moving);
+    if (b.shapes.empty()) b.modes = 0;
+  }
+  return scene;
+}
+
 OutputTable without_coordinates(const OutputTable& table) {
   OutputTable r;
   std::vector<Eigen::Index> kept;
@@ -126,16 +142,23 @@ double settle_time_error(const Scene& scene, Scene& flown, Run& run, Measuring& 
   }
 }
 
-/// Differences of the outputs of another flight at a bearable cost.
+/// Another flight at a bearable cost.
+Run repeated(const Run& run, const Scene& other, int refine, const Measuring& m) {
+  return run_once(other, m.hooks, refine, 20 * run.motion.summary.steps + 10000);
+}
+
+std::vector<OutputDifference> difference(const Run& run, const Run& other, const Scene& scene, const Measuring& m) {
+  return compare_outputs(without_coordinates(run.outputs), without_coordinates(other.outputs), scene.outputs, m.floors);
+}
+
+/// Differences of the outputs of another flight.
 std::vector<OutputDifference> change(const Run& run, const Scene& other, int refine, const Measuring& m) {
-  const long bearable = 20 * run.motion.summary.steps + 10000;
-  const OutputTable repeated = without_coordinates(run_once(other, m.hooks, refine, bearable).outputs);
-  return compare_outputs(without_coordinates(run.outputs), repeated, other.outputs, m.floors);
+  return difference(run, repeated(run, other, refine, m), other, m);
 }
 
 /// The modes left out, first with few digits: more only where the answer would drown in the error of time integration.
-double truncation_error(const Run& run, const Scene& flown, Measuring& m) {
-  Scene more = with_more_modes(flown);
+double truncation_error(const Run& run, const Scene& flown, const StillKinds& still, Measuring& m) {
+  Scene more = without_kinds(with_more_modes(flown), still, m.hooks);
   more.tolerance = std::max(flown.tolerance, 1e-5);
   std::vector<OutputDifference> differences = change(run, more, 0, m);
   if (more.tolerance != flown.tolerance && largest(differences) <= 10 * more.tolerance) {
@@ -170,6 +193,11 @@ bool any_open_stiffening(const Scene& scene, const Scene& flown) {
   return false;
 }
 
+bool all_stiffening_is_on(const Scene& scene) {
+  return std::ranges::all_of(
+      scene.bodies, [](const BodyScene& b) { return b.rigid || b.structure == "rigid" || b.stiffening == "on"; });
+}
+
 bool leaves_stiffening_out(const Run& run) {
   for (size_t i = 0; i < run.bodies.size(); ++i)
     if (run.bodies[i].body.n() > 0 && run.tree->stiffening(static_cast<int>(i)) == Stiffening::off) return true;
@@ -194,11 +222,15 @@ double linearisation_error(const Scene& scene, Scene& flown, Run& run, Measuring
     return unknown;
   }
   std::vector<OutputDifference> differences;
-  if (leaves_stiffening_out(run)) differences = change(run, with_stiffening(flown), 0, m);
+  Run stiffened;
+  if (leaves_stiffening_out(run)) {
+    stiffened = repeated(run, with_stiffening(flown), 0, m);
+    differences = difference(run, stiffened, flown, m);
+  }
   const double bearable = scene.tolerance / 3;
   if (largest(differences) > bearable && any_open_stiffening(scene, flown)) {
     flown = with_stiffening_left_open(scene, std::move(flown));
-    run = run_once(flown, m.hooks);
+    run = all_stiffening_is_on(flown) ? std::move(stiffened) : run_once(flown, m.hooks);
     m.plan.push_back(fmt::format("geometric stiffness changes the outputs by {:.1e}: the run that is kept has it",
                                  largest(differences)));
     differences.clear();
@@ -219,7 +251,8 @@ OutputFloors floors_of(const Scene& scene, const std::vector<PreparedBody>& bodi
   return floors;
 }
 
-ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
+ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan,
+                           const StillKinds& still) {
   Measuring m{hooks, plan, floors_of(scene, run.bodies)};
   ErrorBudget& budget = m.budget;
   Scene flown = as_flown(scene, run);
@@ -240,7 +273,7 @@ ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, 
     else if (scene.from && any_elastic(scene))
       m.missing("truncation", "a saved state knows nothing of modes beyond its own");
     else if (any_elastic(scene))
-      budget.truncation = m.measured("truncation", [&] { return truncation_error(run, flown, m); });
+      budget.truncation = m.measured("truncation", [&] { return truncation_error(run, flown, still, m); });
     else
       budget.truncation = none(&OutputErrors::truncation);
   }

@@ -2,16 +2,25 @@
 
 #include "apps/simulate/simulate.hpp"
 
+#include <map>
+#include <set>
 #include <string>
 #include <vector>
 
 namespace flexboom {
 
+/// Kinds of modes that nothing moves, by the names of bodies.
+using StillKinds = std::map<std::string, std::set<std::string>>;
+
+/// Without modes of these kinds. @throws InputError, NumericalError as prepare_body, of the bodies that have such.
+Scene without_kinds(Scene, const StillKinds&, const RunHooks&);
+
 /// Repeats a run with a tighter tolerance, more modes in and out of the hinge plane, and a finer mesh, and compares the
 /// outputs wanted. When the tighter run differs by more than the tolerance it takes the place of `run`, and `plan` says
-/// so.
+/// so. What is known not to move is no part of more modes.
 /// @throws InputError, NumericalError as run_scene.
-ErrorBudget measure_budget(const Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan);
+ErrorBudget measure_budget(const Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan,
+                           const StillKinds& still = {});
 
 /// Two more modes in each plane, so many times, and both planes: what bends out of the hinge plane is left out, too.
 Scene with_more_modes(Scene, int times = 1);

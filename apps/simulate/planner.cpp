@@ -78,7 +78,7 @@ Scene Planner::with_candidates(const Scene& scene, int candidates, const RunHook
     const int wanted = b.directions == "all" ? candidates : candidates / 2;
     b = with_modes(b, wanted, scene.bodies_kept_in, hooks);
   }
-  return all;
+  return without_kinds(all, still_, hooks);
 }
 
 /// Only clamped modes are independent of each other; other bases are whole.
@@ -95,11 +95,25 @@ std::vector<Planner::Candidate> Planner::ranked(const Scene& scene, const Run& r
     const Deflection deflection(p.body);
     const VectorXd q = amplitudes(run, p.body);
     for (int k = 0; k < p.body.n(); ++k)
-      list.push_back({p.body.name, k + 1, p.body.coordinates[static_cast<size_t>(k)].kind,
+      list.push_back({p.body.name, p.shapes.empty() ? k + 1 : p.shapes[static_cast<size_t>(k)],
+                      p.body.coordinates[static_cast<size_t>(k)].kind,
                       deflection.largest(q[k] * VectorXd::Unit(p.body.n(), k))});
   }
   std::ranges::stable_sort(list, std::greater(), &Candidate::displacement);
   return list;
+}
+
+void Planner::note_still(const std::vector<Candidate>& list) {
+  constexpr int enough = 2;                                                     // one may stand still by chance
+  std::map<std::pair<std::string, std::string>, std::pair<int, double>> kinds;  // number, largest displacement
+  for (const Candidate& c : list) {
+    auto& [count, largest] = kinds[{c.body, c.kind}];
+    ++count, largest = std::max(largest, c.displacement);
+  }
+  if (list.empty() || !(list.front().displacement > 0)) return;
+  for (const auto& [of, seen] : kinds)
+    if (seen.first >= enough && seen.second <= unmoved * list.front().displacement && of.second != "other")
+      still_[of.first].insert(of.second);
 }
 
 Scene Planner::with_first(const Scene& all, const std::vector<Candidate>& list, size_t count) const {
@@ -165,6 +179,7 @@ bool Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::
   const OutputTable wanted = without_coordinates(reference.outputs);
   const OutputFloors floors = floors_of(scene, reference.bodies);
   const std::vector<Candidate> list = ranked(all, reference);
+  note_still(list);
   const auto moving_by = [&](double share) {
     return static_cast<size_t>(std::ranges::count_if(
         list, [&](const Candidate& c) { return c.displacement > share * list.front().displacement; }));
@@ -217,8 +232,11 @@ bool Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::
       if (list[k].body == b.name) (k < enough ? taken : k < moved ? small : still).push_back(list[k].kind);
     plan.push_back(fmt::format(
         "modes of {}: {}, of {} modes; left out: {} that nothing moves, {} that change the outputs "
-        "by {:.1e} together with those of all bodies",
-        b.name, counted(taken), taken.size() + small.size() + still.size(), counted(still), counted(small), error));
+        "by {:.1e} together with those of all bodies{}",
+        b.name, counted(taken), taken.size() + small.size() + still.size(), counted(still), counted(small), error,
+        all.bodies[i].shapes.empty() && all.bodies[i].modes > 0
+            ? ""
+            : fmt::format("; no more of {}, which nothing moved", fmt::join(still_.at(b.name), ", "))));
   }
   return moved > 0 && enough == moved;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/simulate.hpp"
 
 #include <string>
@@ -24,6 +25,9 @@ class Planner {
   /// part, or a truncation that more modes hardly change.
   bool improve(Scene&, const ErrorBudget&, const RunHooks&, std::vector<std::string>& plan);
 
+  /// Kinds of which nothing moves any candidate, as symmetry has it: more of them are not tried.
+  const StillKinds& still() const { return still_; }
+
  private:
   /// A mode of a body.
   struct Candidate {
@@ -41,11 +45,13 @@ class Planner {
   Run with_all(const Scene&, const RunHooks&, Scene& open, Scene& all, std::vector<std::string>& plan);
   bool has_choice(const Scene&, const std::string& body) const;
   std::vector<Candidate> ranked(const Scene&, const Run&) const;
+  void note_still(const std::vector<Candidate>&);
   Scene with_first(const Scene& all, const std::vector<Candidate>&, size_t count) const;
 
-  std::vector<size_t> open_;     // bodies of the scene
-  int candidates_ = 12;          // per body
-  int steps_ = 0;                // improvements so far
+  std::vector<size_t> open_;  // bodies of the scene
+  int candidates_ = 12;       // per body
+  int steps_ = 0;             // improvements so far
+  StillKinds still_;
   bool costly_ = false;          // more candidates are not bearable
   double truncation_ = unknown;  // of the last step
 };

@@ -271,11 +271,11 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
                                 run.motion.summary.rhs_evaluations));
   if (r.scene.error_budget && repeat && !run.motion.summary.interrupted) {
     const Stopwatch start;
-    r.budget = measure_budget(r.scene, run, hooks, words);
+    r.budget = measure_budget(r.scene, run, hooks, words, planner.still());
     while (planner.improve(r.scene, r.budget, hooks, r.plan)) {
       run = run_once(r.scene, of_run);
       words.clear();
-      r.budget = measure_budget(r.scene, run, hooks, words);
+      r.budget = measure_budget(r.scene, run, hooks, words, planner.still());
     }
     r.budget_seconds = start.seconds();
   }

@@ -124,7 +124,22 @@ TEST(Planner, WithoutABudgetCandidatesAreEnoughWhereFewerAre) {
   EXPECT_FALSE(any_has(r.warnings, "may be too few"));
   const RunResult all = run_scene(hard, {});
   EXPECT_TRUE(any_has(all.plan, "chosen again, from 24"));
+  EXPECT_TRUE(any_has(all.plan, "no more of bending_z"));
   EXPECT_TRUE(any_has(all.warnings, "the modes may be too few for 1.0e-12"));
+}
+
+// What symmetry keeps still is no part of what more modes would change, so a budget without it is the same.
+TEST(Planner, WhatNothingMovesIsNoPartOfTheTruncation) {
+  Scene scene = spun_about("z", 1e-4, "2");
+  scene.bodies[1].directions = "all";
+  std::vector<std::string> plan;
+  flexboom::Run one = run_once(scene, {}), other = one;
+  const double all = measure_budget(scene, one, {}, plan).truncation;
+  const double moving = measure_budget(scene, other, {}, plan, {{"boom", {"bending_z", "torsion"}}}).truncation;
+  EXPECT_GT(all, 1e-6);
+  EXPECT_NEAR(moving, all, 1e-3 * all);
+  const double none = measure_budget(scene, other, {}, plan, {{"boom", {"bending_y"}}}).truncation;
+  EXPECT_GT(std::abs(none - all), 0.1 * all) << "a kind that moves is missed";
 }
 
 TEST(Planner, ThePlanIsPartOfTheSceneThatWasRun) {
