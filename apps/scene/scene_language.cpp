@@ -43,7 +43,8 @@ void tolerance(Faults& faults, const std::string& path, const double& value, std
 
 void settle(Faults& faults, const std::string& path, const double& value, std::string_view) {
   if (!(std::isfinite(value) && value < 1))
-    faults.add(path, fmt::format("is {}; it must be below 1 (0: never, negative: the tolerance)", value));
+    faults.add(path,
+               fmt::format("is {}; it must be below 1 (0: never, negative: a hundredth of the tolerance)", value));
 }
 
 void eccentricity(Faults& faults, const std::string& path, const double& value, std::string_view) {
@@ -94,7 +95,8 @@ void integrator_keys(Archive& a, Scene& s) {
         s.integrator);
   a.choice({"formulation", "", "coordinates"}, formulations, s.formulation);
   a.key({"settle", "",
-         "fraction of its largest rate below which a hinge rests at its stop; 0: never, negative: the tolerance"},
+         "fraction of its largest rate below which a hinge rests at its stop; 0: never, negative: a hundredth of the "
+         "tolerance"},
         s.settle, settle);
   a.key({"rescale_at_events", "",
          "whether errors are relative to the motion since the last contact; not with multipliers"},

@@ -28,17 +28,9 @@ Stop stop_of(const Joint& joint, std::size_t index, const ReducedBody& beyond) {
           std::sqrt(m.stiffness / inertia)};
 }
 
-namespace {
-
-/// Bounces that are left out change what they shake: a hundredth of the tolerance. Under 1e-10 they are below the noise
-/// of some methods, which would then not have the same contacts.
-double default_settle(double tolerance) { return std::max(tolerance / 100, std::min(tolerance, 1e-10)); }
-
-}  // namespace
-
 Contacts::Contacts(std::vector<Stop> stops, const FlightOptions& options, std::size_t joints)
     : stops_(std::move(stops)),
-      settle_(options.settle < 0 ? default_settle(options.tolerance) : options.settle),
+      settle_(options.settle_at()),
       history_(stops_at_start(options, joints)),
       closed_(stops_.size(), 0),
       armed_(stops_.size(), 0),

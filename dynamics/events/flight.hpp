@@ -57,6 +57,10 @@ struct FlightOptions {
   const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
   std::function<void(double time, double duration)> progress;  // called now and then
   double checkpoint_every = 10;                                // wall time between two checkpoints [s]
+
+  /// `settle`, or what stands for a negative one. Bounces that are left out change what they shake: a hundredth of the
+  /// tolerance. Under 1e-10 they are below the noise of some methods, which would then not have the same contacts.
+  double settle_at() const { return settle < 0 ? std::max(tolerance / 100, std::min(tolerance, 1e-10)) : settle; }
 };
 
 /// Called at the start of a flight, now and then, and where it fails: with what the flight would return if it were

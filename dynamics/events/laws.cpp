@@ -16,9 +16,7 @@ double round_off_at(double place) { return place_round_off * std::max(1.0, std::
 }  // namespace
 
 Laws::Laws(const std::vector<Joint>& joints, const FlightOptions& options, double round_off)
-    : round_off_(round_off),
-      tolerance_(options.tolerance),
-      settle_(options.settle < 0 ? options.tolerance : options.settle) {
+    : round_off_(round_off), tolerance_(options.tolerance), settle_(options.settle_at()) {
   for (std::size_t i = 0; i < joints.size(); ++i) {
     if (!joints[i].law.given()) continue;
     laws_.push_back({.joint = i, .name = joints[i].name, .model = LawModel(joints[i]), .state = {}, .chatter = {}});

@@ -140,7 +140,9 @@ bool Laws::is_captured(LawMotion& motion, Law& law, double rebound) const {
   const double towards = -motion.joint_acceleration(law.joint) * (rate > 0 ? 1 : -1);
   constexpr double at_once = 1e-9;  // [s]
   const double height = rebound * rebound / (2 * std::max(towards, 1e-300));
-  const double open = 10 * std::max(tolerance_ * law.largest_gap, round_off_);  // of a place, by errors of the method
+  // What an error of a step makes of a place.
+  const double open =
+      std::max(0.1 * tolerance_ * law.largest_gap, 10 * round_off_);  // of a place, by errors of the method
   return towards > 0 && (rebound < settle_ * law.largest_rate || 2 * rebound < at_once * towards || height < open);
 }
 

@@ -3,6 +3,7 @@
 #include "apps/results/results.hpp"
 #include "apps/scene/scene.hpp"
 #include "apps/scene/scene_law.hpp"
+#include "apps/simulate/error_budget.hpp"
 #include "run_testing.hpp"
 
 #include <fmt/format.h>
@@ -137,6 +138,24 @@ TEST(LawScene, GoOnFromTheStateOfAnEarlierRun) {
       for (size_t k = 0; k < law_losses.size(); ++k)
         EXPECT_NEAR(second.ledger->ledger.laws[k], whole.ledger->ledger.laws[k], 1e-6);
     }
+}
+
+// Friction, a rigid stop with restitution and a latch: rebounds that a coarse tolerance leaves out shift the latch.
+TEST(LawScene, ALatchingPanelIsAsGoodAsItsTolerance) {
+  const auto flown = [](const std::string& method, double tolerance) {
+    Scene scene = load_scene("latching-panel");
+    scene.error_budget = false;
+    scene.integrator = method, scene.tolerance = tolerance;
+    return run_scene(scene, {}).outputs;
+  };
+  const OutputTable reference = flown("adams", 1e-10);
+  for (const char* method : {"adams", "erk"}) {
+    for (const double tolerance : {1e-5, 1e-7})
+      EXPECT_LT(largest(compare_outputs(without_coordinates(flown(method, tolerance)), without_coordinates(reference),
+                                        {"hinge.angle", "hinge.rate"})),
+                30 * tolerance)
+          << method << tolerance;
+  }
 }
 
 TEST(LawScene, SummaryTellsWhereTheEnergyWent) {
