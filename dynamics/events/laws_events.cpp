@@ -141,8 +141,7 @@ bool Laws::is_captured(LawMotion& motion, Law& law, double rebound) const {
   constexpr double at_once = 1e-9;  // [s]
   const double height = rebound * rebound / (2 * std::max(towards, 1e-300));
   // What an error of a step makes of a place.
-  const double open =
-      std::max(0.1 * tolerance_ * law.largest_gap, 10 * round_off_);  // of a place, by errors of the method
+  const double open = std::max(0.1 * tolerance_ * law.largest_gap, 10 * round_off_);
   return towards > 0 && (rebound < settle_ * law.largest_rate || 2 * rebound < at_once * towards || height < open);
 }
 
