@@ -17,7 +17,7 @@ namespace flexboom {
 /// A moment of a flight, every number under its name.
 struct FlightState {
   double time = 0;  // [s]
-  int events = 0;  // in the events.csv beside it, until then
+  int events = 0;   // in the events.csv beside it, until then
   std::vector<std::string> names;
   Eigen::VectorXd y;                               // by names
   std::map<std::string, int> modes;                // by body
