@@ -308,8 +308,11 @@ TEST(SlowCombinations, EveryPairOfFeaturesFliesAlikeInBothFormulations) {
         const RunResult relative = run_scene(scene, {});
         for (const char* method : {"exponential", "adams", "bdf"}) {
           std::string worst;
-          scene.integrator = method;
-          const RunResult by_method = run_scene(scene, {});
+          Scene other = scene;
+          other.integrator = method;
+          // Its errors of the high modes are a hundred times what its steps are asked for.
+          if (other.integrator == "bdf") other.tolerance /= 10;
+          const RunResult by_method = run_scene(other, {});
           const double error = apart(relative, by_method, worst);
           EXPECT_LT(error, 1e-6) << name << " by " << method << ": " << worst;
           EXPECT_EQ(relative.trajectory.events.size(), by_method.trajectory.events.size()) << name << " by " << method;
