@@ -21,6 +21,8 @@ Scene with_more_modes(Scene scene, int times) {
   return scene;
 }
 
+long bearable_steps(const Run& run) { return 20 * run.motion.summary.steps + 10000; }
+
 Scene without_kinds(Scene scene, const StillKinds& still, const RunHooks& hooks) {
   for (BodyScene& b : scene.bodies) {
     const auto kinds = still.find(b.name);
@@ -144,7 +146,7 @@ double settle_time_error(const Scene& scene, Scene& flown, Run& run, Measuring& 
 
 /// Another flight at a bearable cost.
 Run repeated(const Run& run, const Scene& other, int refine, const Measuring& m) {
-  return run_once(other, m.hooks, refine, 20 * run.motion.summary.steps + 10000);
+  return run_once(other, m.hooks, refine, bearable_steps(run));
 }
 
 std::vector<OutputDifference> difference(const Run& run, const Run& other, const Scene& scene, const Measuring& m) {

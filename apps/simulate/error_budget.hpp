@@ -9,6 +9,9 @@
 
 namespace flexboom {
 
+/// Steps that a flight in comparison with another may take; beyond, it costs too much.
+long bearable_steps(const Run&);
+
 /// Kinds of modes that nothing moves, by the names of bodies.
 using StillKinds = std::map<std::string, std::set<std::string>>;
 

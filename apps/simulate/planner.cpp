@@ -139,7 +139,7 @@ Run Planner::with_all(const Scene& scene, const RunHooks& hooks, Scene& open, Sc
     return run_once(all, hooks, 0, max_steps);
   };
   const Run few = run(fewest, 0);
-  const long bearable = 20 * few.motion.summary.steps + 10000;
+  const long bearable = bearable_steps(few);
   for (; candidates_ > fewest && !stopped(hooks); candidates_ /= 2) {
     try {
       return run(candidates_, bearable);
@@ -186,8 +186,7 @@ bool Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::
   };
   const auto error_with = [&](size_t count) {
     try {
-      const long bearable = 20 * reference.motion.summary.steps + 10000;
-      const Run run = run_once(with_first(all, list, count), hooks, 0, bearable);
+      const Run run = run_once(with_first(all, list, count), hooks, 0, bearable_steps(reference));
       return largest(compare_outputs(without_coordinates(run.outputs), wanted, scene.outputs, floors));
     } catch (const NumericalError&) {
       return unknown;

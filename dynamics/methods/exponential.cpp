@@ -308,13 +308,16 @@ class ExponentialStepper final : public Stepper {
     const double c = collocation::node(j);
     y_.head(nx_) = step_.X.col(j);
     if (layout_.attitudes_matter && j == 0) y_ = start_;
-    if (layout_.attitudes_matter && j > 0) {
-      motion_.turn(step_, (*step_.grid)[static_cast<size_t>(j)], c, y_);
-      motion_.place(step_, c, y_);
-    }
+    if (layout_.attitudes_matter && j > 0) follow_to((*step_.grid)[static_cast<size_t>(j)], c);
     const double t = force(c);
     F_.col(j) = y_dot_.head(nx_);
     motion_.take(j, t, y_, y_dot_);
+  }
+
+  /// Attitudes and places of y_ at a fraction of the step.
+  void follow_to(const GridPoint& point, double c) {
+    motion_.turn(step_, point, c, y_);
+    motion_.place(step_, c, y_);
   }
 
   /// The derivative of y_ at a fraction of the step, but for what is prescribed; returns the time.
@@ -374,10 +377,7 @@ class ExponentialStepper final : public Stepper {
       step_.linear->combine(scratch_, 0, step_.Z.col(0), step_.M, at_end_.col(0));
       step_.linear->to_x(at_end_.leftCols<1>(), x_at_end_.leftCols<1>());
       y_.head(nx_) = x_at_end_.col(0);
-      if (layout_.attitudes_matter) {
-        motion_.turn(step_, scratch_, c, y_);
-        motion_.place(step_, c, y_);
-      }
+      if (layout_.attitudes_matter) follow_to(scratch_, c);
       force(c);
       step_.linear->remainder(y_dot_.head(nx_), at_end_.leftCols<1>(), at_end_.rightCols<1>());
       error_modes_.noalias() = at_end_.col(1) - step_.N * (collocation::coefficients() * collocation::monomials(c));
