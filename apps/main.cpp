@@ -165,6 +165,10 @@ struct CommandLine {
                   "none, modal:ZETA, loss-factor:ETA or rayleigh:ALPHA,BETA (default: the file's)");
     c->add_flag("!--no-stiffening", reduce.stiffening, "Leave geometric stiffness out");
     c->add_option("--loads-at", reduce.loads_at, "Node sets where loads stiffen the body; all that move by default");
+    c->add_option("--errors", reduce.errors,
+                  "What the file keeps for the error budget of a run: all (a body with more modes and one of finer "
+                  "elements; default), modes (the former) or none")
+        ->check(CLI::IsMember(std::vector<std::string>(kept_for_errors.begin(), kept_for_errors.end())));
     add_model_options(c, reduce.options);
     c->callback([this] { action = [this] { return reduce_command(reduce, common); }; });
   }

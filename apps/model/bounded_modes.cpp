@@ -35,16 +35,6 @@ bool follows_accuracy(const Model& model) {
          g.end_layers < 0 && g.first_layer == 0 && g.growth == 0 && g.corner_levels < 0 && g.factor == 0;
 }
 
-/// Of the errors from one mesh to the next. Edges along the boom are singular, and no mesh is refined toward them.
-double slowest_fall(const Model& model) {
-  constexpr double smooth = 0.5, singular = 0.65;
-  if (!is_solid(model)) return smooth;
-  const BodyScene& body = *model.body;
-  const bool edges = std::ranges::any_of(
-      body.geometry.segments, [](const BeamSegment& s) { return std::holds_alternative<RectangularTube>(s.start); });
-  return edges || body.solid.slit > 0 ? singular : smooth;
-}
-
 BoundedModes modes_of(Model model, const EigenOptions& options, int threads) {
   BoundedModes r;
   Stopwatch clock;
@@ -89,6 +79,16 @@ FrequencyBounds bounds_of(const ModalBasis& m, const ModalBasis& other, double s
 }
 
 }  // namespace
+
+/// Edges along the boom are singular, and no mesh is refined toward them.
+double slowest_fall(const Model& model) {
+  constexpr double smooth = 0.5, singular = 0.65;
+  if (!is_solid(model)) return smooth;
+  const BodyScene& body = *model.body;
+  const bool edges = std::ranges::any_of(
+      body.geometry.segments, [](const BeamSegment& s) { return std::holds_alternative<RectangularTube>(s.start); });
+  return edges || body.solid.slit > 0 ? singular : smooth;
+}
 
 double FrequencyBounds::worst(int rigid_freedoms) const {
   double r = 0;

@@ -34,6 +34,9 @@ struct BoundedModes {
   std::optional<bool> met() const;
 };
 
+/// Of the discretisation errors of a model, at most: what is left of them on the next finer mesh.
+double slowest_fall(const Model&);
+
 /// Modes of a model, each frequency with a bound from a mesh of the same boom that is one step finer (`refined`).
 ///
 /// From one mesh to the next, errors are assumed to fall by a factor f or more: 0.5, or 0.65 where edges along the boom

@@ -38,7 +38,8 @@ void read_body_file(const std::filesystem::path& path, const std::string& key_pa
 void read_reduced_file(const std::filesystem::path& path, BodyScene& body) {
   body.modes = 0;
   body.reduced_file = std::filesystem::absolute(path).lexically_normal();
-  body.reduced = std::make_shared<const ReducedBody>(flexboom::read_body_file(path));
+  const auto file = std::make_shared<const BodyFile>(read_whole_body_file(path));
+  body.reduced = {file, &file->body}, body.richer = {file, &file->richer};
   body.structure = body.reduced->structure;
   body.name = body.reduced->name;
 }

@@ -4,7 +4,7 @@
 #include "dynamics/model/hub_with_booms.hpp"
 #include "fem/booms/solid_boom.hpp"
 #include "reduction/basis/basis.hpp"
-#include "reduction/body/reduced_body.hpp"
+#include "reduction/body_file/body_file.hpp"
 
 #include <Eigen/Core>
 
@@ -54,6 +54,7 @@ struct BodyScene {
   std::optional<RigidScene> rigid;             // instead of a geometry; structure is "rigid"
   std::shared_ptr<const ReducedBody> reduced;  // instead of a geometry; structure is that of the file
   std::filesystem::path reduced_file;          // where `reduced` is from, absolute
+  std::shared_ptr<const RicherBodies> richer;  // what the file has for error estimates; may be null
   /// Modes of all directions count, unless the file says which.
   void open_directions() {
     if (!directions_given) directions = "all";

@@ -11,7 +11,23 @@
 
 namespace flexboom {
 
+namespace {
+
+using Richer = std::optional<ReducedBody> RicherBodies::*;
+
+bool has(const BodyScene& b, Richer richer) { return b.richer && ((*b.richer).*richer).has_value(); }
+
+/// Bodies from files by the richer ones that their files have.
+Scene with_richer(Scene scene, Richer richer) {
+  for (BodyScene& b : scene.bodies)
+    if (b.reduced && has(b, richer)) b.reduced = {b.richer, &*((*b.richer).*richer)};
+  return scene;
+}
+
+}  // namespace
+
 Scene with_more_modes(Scene scene, int times) {
+  scene = with_richer(std::move(scene), &RicherBodies::more_modes);
   for (BodyScene& b : scene.bodies) {
     if (b.structure == "rigid" || !b.is_boom()) continue;
     b.modes = b.directions == "all" ? b.modes + 4 * times : 2 * (b.modes + 2 * times);
@@ -62,15 +78,25 @@ namespace {
 /// Does the model of any body leave elasticity or modes out? What is said to be rigid is.
 bool any_elastic(const Scene& scene, std::string_view structure = "") {
   return std::ranges::any_of(scene.bodies, [&](const BodyScene& b) {
-    return b.is_boom() && b.structure != "rigid" && (structure.empty() || b.structure == structure);
+    return !b.rigid && b.structure != "rigid" && (structure.empty() || b.structure == structure);
   });
 }
 
-/// The first body that was reduced before, from a model that has more to say.
-const BodyScene* any_reduced(const Scene& scene) {
-  const auto found = std::ranges::find_if(
-      scene.bodies, [](const BodyScene& b) { return b.reduced && b.reduced->structure != "rigid"; });
+/// The first body from a file that has no such richer one, though its model has more to say.
+const BodyScene* any_without(const Scene& scene, Richer richer) {
+  const auto found = std::ranges::find_if(scene.bodies, [&](const BodyScene& b) {
+    const bool is_exact = richer == &RicherBodies::finer_elements && b.structure == "eq14";
+    return b.reduced && b.reduced->structure != "rigid" && !is_exact && !has(b, richer);
+  });
   return found == scene.bodies.end() ? nullptr : &*found;
+}
+
+/// Of bodies from files: their finer elements are one step away. Others are compared over two.
+double error_per_change(const Scene& scene) {
+  double r = 1;
+  for (const BodyScene& b : scene.bodies)
+    if (b.reduced && has(b, &RicherBodies::finer_elements)) r = std::max(r, b.richer->error_per_change);
+  return r;
 }
 
 using Part = double OutputErrors::*;
@@ -88,12 +114,13 @@ struct Measuring {
     budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
   }
 
-  /// Enters what a repeat has changed in each output, and `more` of the largest value of each. Returns the largest.
-  double enter(Part part, const std::vector<OutputDifference>& differences, double more = 0) {
+  /// Enters what a repeat has changed in each output, `factor` times, and `more` of the largest value of each. Returns
+  /// the largest.
+  double enter(Part part, const std::vector<OutputDifference>& differences, double more = 0, double factor = 1) {
     double most = 0;
     for (OutputErrors& o : budget.outputs) {
       const auto d = std::ranges::find(differences, o.name, &OutputDifference::name);
-      const double error = d == differences.end() ? 0 : d->error, before = worst_part(o);
+      const double error = d == differences.end() ? 0 : factor * d->error, before = worst_part(o);
       if (d != differences.end()) o.scale = std::max(o.scale, d->scale), o.size = std::max(o.size, d->size);
       o.*part = error + (o.scale > 0 ? more * o.size / o.scale : 0);
       if (error > before) o.when = d->time;
@@ -264,26 +291,28 @@ ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, 
     o.name = d.name, o.scale = d.scale, o.size = d.size;
   }
   budget.linearisation = m.measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
-  const BodyScene* reduced = any_reduced(scene);
-  const std::string finished =
-      reduced ? fmt::format("body {} was reduced before, and its file has no more", reduced->name) : "";
+  const auto is_missing = [&](std::string_view part, Richer richer, std::string_view what) {
+    const BodyScene* b = any_without(scene, richer);
+    if (b != nullptr) m.missing(part, fmt::format("body {} was reduced before, and its file has no {}", b->name, what));
+    return b != nullptr;
+  };
   if (!m.stopped()) budget.time = m.measured("time", [&] { return settle_time_error(scene, flown, run, m); });
   const auto none = [&m](Part part) { return m.enter(part, {}); };
-  if (!m.stopped()) {
-    if (reduced)
-      m.missing("truncation", finished + " modes");
-    else if (scene.from && any_elastic(scene))
+  const bool elastic = any_elastic(scene);
+  if (!m.stopped() && !is_missing("truncation", &RicherBodies::more_modes, "more modes")) {
+    if (scene.from && elastic)
       m.missing("truncation", "a saved state knows nothing of modes beyond its own");
-    else if (any_elastic(scene))
+    else if (elastic)
       budget.truncation = m.measured("truncation", [&] { return truncation_error(run, flown, still, m); });
     else
       budget.truncation = none(&OutputErrors::truncation);
   }
-  if (!m.stopped()) {
-    const auto finer = [&] { return m.enter(&OutputErrors::discretisation, change(run, flown, 2, m)); };
-    if (reduced && reduced->reduced->structure != "eq14")
-      m.missing("discretisation", finished + " elements");
-    else if (any_elastic(scene, "beam") || any_elastic(scene, "solid"))
+  if (!m.stopped() && !is_missing("discretisation", &RicherBodies::finer_elements, "finer elements")) {
+    const Scene fine = with_richer(flown, &RicherBodies::finer_elements);
+    const auto finer = [&] {
+      return m.enter(&OutputErrors::discretisation, change(run, fine, 2, m), 0, error_per_change(scene));
+    };
+    if (any_elastic(scene, "beam") || any_elastic(scene, "solid"))
       budget.discretisation = m.measured("discretisation", finer);
     else
       budget.discretisation = none(&OutputErrors::discretisation);

@@ -26,6 +26,7 @@ ErrorBudget measure_budget(const Scene&, Run& run, const RunHooks&, std::vector<
                            const StillKinds& still = {});
 
 /// Two more modes in each plane, so many times, and both planes: what bends out of the hinge plane is left out, too.
+/// Bodies from files get the modes that their files have beyond those kept.
 Scene with_more_modes(Scene, int times = 1);
 
 /// All geometric stiffness.

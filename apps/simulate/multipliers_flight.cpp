@@ -116,7 +116,7 @@ std::vector<LargestStiffening> largest_stiffening(const Multipliers& system, con
   std::vector<LargestStiffening> largest(system.multibody().bodies.size());
   const size_t stride = flight.states.size() / 500 + 1;
   for (size_t row = 0; row < flight.states.size(); row += stride)
-    observe(stiffening_effect(system, flight.states[row]), flight.time[row], largest);
+    observe(stiffening_effect(system, flight.time[row], flight.states[row]), flight.time[row], largest);
   return largest;
 }
 

@@ -195,8 +195,9 @@ void describe_model(const Scene& scene, const Run& run, std::vector<std::string>
     const BodyScene& b = scene.bodies[i];
     if (b.rigid) plan.push_back(fmt::format("{}: rigid, {:g} kg", b.name, b.rigid->mass));
     if (b.reduced)
-      plan.push_back(fmt::format("{}: reduced body of {}, {} coordinates; its own truncation is not measured", b.name,
-                                 b.reduced_file.string(), run.bodies[i].body.n()));
+      plan.push_back(fmt::format("{}: reduced body of {}, {} coordinates{}", b.name, b.reduced_file.string(),
+                                 run.bodies[i].body.n(),
+                                 b.richer && b.richer->more_modes ? "" : "; its own truncation is not measured"));
     if (run.bodies[i].body.n() == 0) continue;
     if (!tip_of(run.bodies[i].body))
       plan.push_back(fmt::format("{0}: no output {0}.tip: {1}", b.name, no_tip(run.bodies[i].body)));

@@ -25,6 +25,9 @@ struct Prepared {
   std::vector<PlaceData> loads;
 };
 
+/// Constants of a place, with those of geometric stiffness where its body has it on.
+PlaceData place_data(const Multibody&, const std::vector<Stiffening>&, const Place&);
+
 /// Sums what is added, always in the same order, into the values of a matrix with a fixed pattern.
 class PatternSum {
  public:

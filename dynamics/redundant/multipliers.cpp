@@ -71,8 +71,6 @@ BodyData body_data(const ReducedBody& body, Stiffening stiffening) {
   return d;
 }
 
-namespace {
-
 PlaceData place_data(const Multibody& scene, const std::vector<Stiffening>& stiffening, const Place& place) {
   PlaceData p;
   p.body = place.body;
@@ -96,7 +94,6 @@ PlaceData place_data(const Multibody& scene, const std::vector<Stiffening>& stif
   return p;
 }
 
-}  // namespace
 }  // namespace redundant
 
 using namespace redundant;

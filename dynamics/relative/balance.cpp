@@ -1,7 +1,7 @@
 #include "dynamics/relative/impl.hpp"
+#include "dynamics/relative/loaded_bodies.hpp"
 #include "dynamics/relative/momenta.hpp"
 #include "fem/base/check.hpp"
-#include "reduction/invariants/geometric_stiffness.hpp"
 
 #include <Eigen/Cholesky>
 
@@ -95,6 +95,20 @@ Balance Tree::balance(double t, const Eigen::Ref<const VectorXd>& y, TreeWorkspa
   return b;
 }
 
+namespace {
+
+/// A place, after the links have moved.
+PlaceMotionInSpace in_space(const tree::Model& model, const Place& place, const VectorXd& y,
+                            tree::Scratch<double>& scratch) {
+  const tree::PlacedOn on = tree::packed_place(model, place, "place");
+  const auto found = tree::find_place(model, on, y.data(), scratch, scratch.U);
+  PlaceMotionInSpace m{eigen(found.position), eigen(found.velocity), eigen(found.omega), {}};
+  for (int i = 0; i < 3; ++i) m.axes.row(i) = eigen(found.axes.row[static_cast<size_t>(i)]).transpose();
+  return m;
+}
+
+}  // namespace
+
 PlaceMotionInSpace Tree::motion(double t, const Eigen::Ref<const VectorXd>& state, const Place& place) const {
   const tree::Model& model = impl_->model;
   VectorXd y = state;
@@ -103,11 +117,7 @@ PlaceMotionInSpace Tree::motion(double t, const Eigen::Ref<const VectorXd>& stat
   tree::Instant instant(model);
   tree::set_instant(model, t, instant);
   tree::move_links(model, y.data(), instant, true, scratch);
-  const tree::PlacedOn on = tree::packed_place(model, place, "place");
-  const auto found = tree::find_place(model, on, y.data(), scratch, scratch.U);
-  PlaceMotionInSpace m{eigen(found.position), eigen(found.velocity), eigen(found.omega), {}};
-  for (int i = 0; i < 3; ++i) m.axes.row(i) = eigen(found.axes.row[static_cast<size_t>(i)]).transpose();
-  return m;
+  return in_space(model, place, y, scratch);
 }
 
 std::vector<JointLoad> Tree::joint_loads(double t, const Eigen::Ref<const VectorXd>& y, std::span<const char> contact,
@@ -132,47 +142,28 @@ std::vector<JointLoad> Tree::joint_loads(double t, const Eigen::Ref<const Vector
   return loads;
 }
 
-namespace {
-
-/// Kg of the motion of a body; s: what the sweeps left.
-MatrixXd stiffness_of_motion(const ReducedBody& body, const tree::Link& link, const tree::LinkScratch<double>& s) {
-  const Vec3<double>& o = link.brf_origin;
-  const auto& A = link.brf_axes;
-  const Vec3<double> a = s.acceleration.t + cross(s.acceleration.w, o) + cross(s.w, cross(s.w, o));
-  return motion_stiffness(body, eigen(transposed_product(A, s.w)), eigen(transposed_product(A, a)),
-                          eigen(transposed_product(A, s.acceleration.w)));
-}
-
-}  // namespace
-
-StiffeningEffect stiffening_effect(const ReducedBody& body, const MatrixXd& Kg) {
-  const auto [least, most] = relative_stiffness(body, Kg);
-  return {std::max(-least, most), std::max(-least, 0.0)};
-}
-
-std::vector<StiffeningEffect> Tree::stiffening_effect(double t, const Eigen::Ref<const VectorXd>& y,
+std::vector<StiffeningEffect> Tree::stiffening_effect(double t, const Eigen::Ref<const VectorXd>& state,
                                                       std::span<const char> contact,
                                                       std::span<const LawBranch> laws) const {
   const tree::Model& model = impl_->model;
-  const tree::Scratch<double> scratch = evaluated(*this, model, t, y, contact, laws);
-  std::vector<MatrixXd> K(impl_->scene.bodies.size());
+  const VectorXd y = state;
+  tree::Scratch<double> scratch = evaluated(*this, model, t, y, contact, laws);
+  LoadedBodies bodies(impl_->scene, [&](const Place& place) { return in_space(model, place, y, scratch); });
+  std::vector<JointLoad> loads(impl_->scene.joints.size());
   for (size_t i = 0; i < model.links.size(); ++i) {
     const tree::Link& link = model.links[i];
     const tree::LinkScratch<double>& s = scratch.links[i];
-    K[static_cast<size_t>(link.index)] =
-        stiffness_of_motion(impl_->scene.bodies[static_cast<size_t>(link.index)], link, s);
-    if (!link.hung_on_moving_place) continue;
-    const tree::Link& parent = model.links[static_cast<size_t>(link.parent)];
+    const Vec3<double>& o = link.brf_origin;
+    const auto in_brf = [&](const Vec3<double>& v) { return eigen(transposed_product(link.brf_axes, v)); };
+    const Vec3<double> a = s.acceleration.t + cross(s.acceleration.w, o) + cross(s.w, cross(s.w, o));
+    bodies.move(static_cast<size_t>(link.index), in_brf(s.w), in_brf(a), in_brf(s.acceleration.w));
     const tree::Twist<double> load = tree::joint_load(s);
-    const Vec3<double> F = -(s.A * load.t), M = -(s.A * load.w) + cross(s.lever, F);
-    K[static_cast<size_t>(parent.index)] +=
-        marker_stiffness(impl_->scene.bodies[static_cast<size_t>(parent.index)],
-                         impl_->scene.joints[static_cast<size_t>(link.joint)].a.marker,
-                         eigen(transposed_product(parent.brf_axes, F)), eigen(transposed_product(parent.brf_axes, M)));
+    loads[static_cast<size_t>(link.joint)] = {eigen(load.t), eigen(load.w), {}};
   }
-  std::vector<StiffeningEffect> effect;
-  for (size_t i = 0; i < K.size(); ++i) effect.push_back(flexboom::stiffening_effect(impl_->scene.bodies[i], K[i]));
-  return effect;
+  bodies.push_by_joints(loads);
+  bodies.push_by_loads(t);
+  bodies.push_by_springs();
+  return bodies.effects();
 }
 
 }  // namespace flexboom

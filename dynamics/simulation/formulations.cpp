@@ -3,7 +3,7 @@
 #include "dynamics/numerics/rotation.hpp"
 #include "dynamics/redundant/equations.hpp"
 #include "dynamics/redundant/scratch.hpp"
-#include "reduction/invariants/geometric_stiffness.hpp"
+#include "dynamics/relative/loaded_bodies.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -137,31 +137,19 @@ std::vector<JointLoad> joint_loads(const Multipliers& system, const MultibodySta
   return loads;
 }
 
-std::vector<StiffeningEffect> stiffening_effect(const Multipliers& system, const MultibodyState& s) {
+std::vector<StiffeningEffect> stiffening_effect(const Multipliers& system, double t, const MultibodyState& s) {
   const Prepared& p = system.impl();
-  std::vector<MatrixXd> K;
-  std::vector<Matrix3d> A;
+  LoadedBodies bodies(
+      p.scene, [&](const Place& place) { return motion_of(place_data(p.scene, p.stiffening, place), s.bodies); });
   for (size_t i = 0; i < s.bodies.size(); ++i) {
-    A.push_back(rotation_matrix(s.bodies[i].attitude));
-    K.push_back(motion_stiffness(p.scene.bodies[i], s.bodies[i].omega,
-                                 A[i].transpose() * (s.accelerations[i].of_origin - p.scene.gravity),
-                                 s.accelerations[i].angular));
+    const Matrix3d to_body = rotation_matrix(s.bodies[i].attitude).transpose();
+    bodies.move(i, s.bodies[i].omega, to_body * (s.accelerations[i].of_origin - p.scene.gravity),
+                s.accelerations[i].angular);
   }
-  const auto push = [&](const Place& at, const Vector3d& force, const Vector3d& torque) {
-    if (at.body < 0 || at.marker.empty()) return;
-    const auto b = static_cast<size_t>(at.body);
-    K[b] += marker_stiffness(p.scene.bodies[b], at.marker, A[b].transpose() * force, A[b].transpose() * torque);
-  };
-  const std::vector<JointLoad> loads = joint_loads(system, s);
-  for (size_t i = 0; i < loads.size(); ++i) {
-    const Pair pair(p.joints[i], s.bodies);
-    const Vector3d force = pair.b.axes * loads[i].force, torque = pair.b.axes * loads[i].torque;
-    push(p.scene.joints[i].b, force, torque);
-    push(p.scene.joints[i].a, -force, -torque - (pair.b.position - pair.a.position).cross(force));
-  }
-  std::vector<StiffeningEffect> effect;
-  for (size_t i = 0; i < K.size(); ++i) effect.push_back(stiffening_effect(p.scene.bodies[i], K[i]));
-  return effect;
+  bodies.push_by_joints(joint_loads(system, s));
+  bodies.push_by_loads(t);
+  bodies.push_by_springs();
+  return bodies.effects();
 }
 
 }  // namespace flexboom

@@ -22,6 +22,6 @@ TreeState tree_state(const Multipliers&, const MultibodyState&);
 std::vector<JointLoad> joint_loads(const Multipliers&, const MultibodyState&);
 
 /// As Tree::stiffening_effect.
-std::vector<StiffeningEffect> stiffening_effect(const Multipliers&, const MultibodyState&);
+std::vector<StiffeningEffect> stiffening_effect(const Multipliers&, double t, const MultibodyState&);
 
 }  // namespace flexboom

@@ -53,9 +53,16 @@ Shape joined(Shape lead, const Shape& each) {
 Eigen::Index rows(const Shape& each) { return static_cast<Eigen::Index>(each[0]); }
 Eigen::Index cols(const Shape& each) { return each.size() > 1 ? static_cast<Eigen::Index>(each[1]) : 1; }
 
+/// The field in a group of the file: "more_modes/Me" for "Me".
+Field in_group(const std::string& group, Field field) {
+  field.name.insert(0, group);
+  return field;
+}
+
+/// `group`: of the body in the file, empty or ending in a slash.
 class Saver {
  public:
-  explicit Saver(Hdf5Writer& file) : file_(file) {}
+  Saver(Hdf5Writer& file, std::string group) : file_(file), group_(std::move(group)) {}
 
   static std::uint64_t size(const std::string& name, std::uint64_t current, const Shape& allowed) {
     check_count(name, current, allowed);
@@ -67,7 +74,7 @@ class Saver {
     check_count(name, list.size(), {count});
   }
 
-  void attribute(const std::string& name, const std::string& text) { file_.write_attribute(name, text); }
+  void attribute(const std::string& name, const std::string& text) { file_.write_attribute(group_ + name, text); }
 
   template <class Matrix>
   void matrices(const Field& field, const Shape& lead, const Shape& each, const std::vector<Matrix*>& blocks) {
@@ -81,7 +88,7 @@ class Saver {
       }
     }
     check_finite(field, values);
-    file_.write(field, joined(lead, each), values);
+    file_.write(in_group(group_, field), joined(lead, each), values);
   }
 
   template <class T>
@@ -91,18 +98,20 @@ class Saver {
     values.reserve(entries.size());
     for (const T* entry : entries) values.push_back(static_cast<Value>(*entry));
     check_finite(field, values);
-    file_.write(field, shape, values);
+    file_.write(in_group(group_, field), shape, values);
   }
 
  private:
   Hdf5Writer& file_;
+  std::string group_;
 };
 
 class Loader {
  public:
-  explicit Loader(Hdf5Reader& file) : file_(file) {}
+  Loader(Hdf5Reader& file, std::string group) : file_(file), group_(std::move(group)) {}
 
-  std::uint64_t size(const std::string& name, std::uint64_t /*current*/, const Shape& allowed) const {
+  std::uint64_t size(const std::string& in_body, std::uint64_t /*current*/, const Shape& allowed) const {
+    const std::string name = group_ + in_body;
     const Shape shape = file_.shape(name);
     require(!shape.empty(), fmt::format(R"(dataset "{}" is a single value, must be a list)", name));
     check_count("dataset \"" + name + "\"", shape[0], allowed);
@@ -114,11 +123,11 @@ class Loader {
     list.resize(count);
   }
 
-  void attribute(const std::string& name, std::string& text) { text = file_.text_attribute(name); }
+  void attribute(const std::string& name, std::string& text) { text = file_.text_attribute(group_ + name); }
 
   template <class Matrix>
   void matrices(const Field& field, const Shape& lead, const Shape& each, const std::vector<Matrix*>& blocks) {
-    const std::vector<double> values = file_.read<double>(field, joined(lead, each));
+    const std::vector<double> values = file_.read<double>(in_group(group_, field), joined(lead, each));
     check_finite(field, values);
     auto value = values.begin();
     for (Matrix* A : blocks) {
@@ -131,7 +140,7 @@ class Loader {
 
   template <class T>
   void values(const Field& field, const Shape& shape, const std::vector<T*>& entries) {
-    const auto values = file_.read<typename Stored<T>::type>(field, shape);
+    const auto values = file_.read<typename Stored<T>::type>(in_group(group_, field), shape);
     check_finite(field, values);
     for (size_t i = 0; i < values.size(); ++i) {
       if constexpr (std::is_same_v<T, bool>) {
@@ -145,6 +154,7 @@ class Loader {
 
  private:
   Hdf5Reader& file_;
+  std::string group_;
 };
 
 /// Lines and triangles lie over the points.
@@ -161,48 +171,81 @@ void check_display(const DisplayShape& display) {
   }
 }
 
-ReducedBody body_of(const std::string& bytes) {
-  check_seal(bytes);
+// Groups of the richer bodies in a file.
+constexpr const char* more_modes = "more_modes";
+constexpr const char* finer_elements = "finer_elements";
+const Field error_per_change = {"error_per_change", "1",
+                                "error of the elements by what the finer ones change, at most"};
+
+void save(Hdf5Writer& file, const std::string& group, const ReducedBody& body) {
+  body.validate();
+  check_display(body.display);
+  Saver saver(file, group);
+  body_file::fields(saver, body);
+}
+
+ReducedBody load(Hdf5Reader& file, const std::string& group) {
+  ReducedBody body;
+  Loader loader(file, group);
+  body_file::fields(loader, body);
+  return body;
+}
+
+BodyFile content_of(const std::string& bytes) {
+  const int version = check_seal(bytes);
   Hdf5Reader file(bytes);
   require(file.text_attribute("format") == format_name,
           fmt::format(R"(the attribute "format" must be "{}")", format_name));
-  const int version = file.integer_attribute("version");
-  require(version == body_file_version, fmt::format("the attribute \"version\" must be {}", body_file_version));
-  ReducedBody body;
-  Loader loader(file);
-  body_file::fields(loader, body);
+  require(file.integer_attribute("version") == version,
+          fmt::format("the attribute \"version\" must be {}, as in the head of the file", version));
+  BodyFile r{.body = load(file, "")};
+  const auto richer = [&](const std::string& group) -> std::optional<ReducedBody> {
+    if (version == version_without_richer_bodies || file.integer_attribute(group) == 0) return {};
+    return load(file, group + "/");
+  };
+  r.richer = {richer(more_modes), richer(finer_elements)};
+  if (r.richer.finer_elements) r.richer.error_per_change = file.read<double>(error_per_change, {}).front();
   const std::string content = file.content().digest();
   require(file.text_attribute("checksum") == content,
           "checksum of the content does not match: the file was changed after it was written");
-  check_display(body.display);
-  body.validate();
-  return body;
+  const auto check = [](const ReducedBody& body) { check_display(body.display), body.validate(); };
+  check(r.body);
+  for (const std::optional<ReducedBody>* body : {&r.richer.more_modes, &r.richer.finer_elements})
+    if (*body) check(**body);
+  return r;
 }
 
 }  // namespace
 
-void write_body_file(const std::filesystem::path& path, const ReducedBody& body) {
+void write_body_file(const std::filesystem::path& path, const ReducedBody& body, const RicherBodies& richer) {
   std::string bytes;
+  const int version = richer.empty() ? version_without_richer_bodies : body_file_version;
   within("cannot write " + path.string(), [&] {
-    body.validate();
-    check_display(body.display);
     Hdf5Writer file(seal_size);
     file.write_attribute("format", std::string(format_name));
-    file.write_attribute("version", body_file_version);
-    Saver saver(file);
-    body_file::fields(saver, body);
+    file.write_attribute("version", version);
+    save(file, "", body);
+    const auto save_richer = [&](const std::string& group, const std::optional<ReducedBody>& other) {
+      if (richer.empty()) return;
+      file.write_attribute(group, other ? 1 : 0);
+      if (other) save(file, group + "/", *other);
+    };
+    save_richer(more_modes, richer.more_modes), save_richer(finer_elements, richer.finer_elements);
+    if (richer.finer_elements) file.write(error_per_change, {}, std::vector{richer.error_per_change});
     file.write_attribute("checksum", file.content().digest());
     bytes = file.bytes();
-    seal(bytes);
+    seal(bytes, version);
   });
   write_file(path, bytes);
 }
 
-ReducedBody read_body_file(const std::filesystem::path& path) {
+BodyFile read_whole_body_file(const std::filesystem::path& path) {
   const std::string bytes = file_bytes(path);
-  ReducedBody body;
-  within(path.string(), [&] { body = body_of(bytes); });
-  return body;
+  BodyFile r;
+  within(path.string(), [&] { r = content_of(bytes); });
+  return r;
 }
+
+ReducedBody read_body_file(const std::filesystem::path& path) { return read_whole_body_file(path).body; }
 
 }  // namespace flexboom

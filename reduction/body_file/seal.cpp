@@ -12,17 +12,17 @@ namespace {
 constexpr std::string_view format_word = "flexboom-body ";
 constexpr std::string_view hdf5_signature = "\x89HDF\r\n\x1a\n";
 
-std::string seal_of(std::string_view bytes) {
-  std::string head = fmt::format("{}{} sha256 {}\n", format_word, body_file_version, sha256(bytes.substr(seal_size)));
+std::string seal_of(std::string_view bytes, long version) {
+  std::string head = fmt::format("{}{} sha256 {}\n", format_word, version, sha256(bytes.substr(seal_size)));
   head.resize(seal_size, '\0');
   return head;
 }
 
 }  // namespace
 
-void seal(std::string& bytes) { bytes.replace(0, seal_size, seal_of(bytes)); }
+void seal(std::string& bytes, int version) { bytes.replace(0, seal_size, seal_of(bytes, version)); }
 
-void check_seal(std::string_view bytes) {
+int check_seal(std::string_view bytes) {
   require(!bytes.empty(), "the file is empty");
   require(!bytes.starts_with(hdf5_signature),
           "an HDF5 file, but not a reduced body of flexboom, which begins with a line \"flexboom-body 1 sha256 ...\"");
@@ -34,7 +34,9 @@ void check_seal(std::string_view bytes) {
           fmt::format("version {} of the format, this program reads version {}: a newer flexboom wrote it", number,
                       body_file_version));
   require(bytes.size() > seal_size, "the file was cut off");
-  require(bytes.starts_with(seal_of(bytes)), "checksum does not match: the file was changed after it was written");
+  require(version && bytes.starts_with(seal_of(bytes, *version)),
+          "checksum does not match: the file was changed after it was written");
+  return static_cast<int>(*version);
 }
 
 }  // namespace flexboom

@@ -1134,7 +1134,8 @@ class Reduce(Case):
         for word in ("finer quadrature", "Bessel", "six rigid motions", "unit force at tip along y"):
             self.assertIn(word, names)
         seconds = document["seconds"]
-        stages = sum(seconds[k] for k in ("mesh", "assemble", "modes", "invariants", "stiffening", "certificate"))
+        stages = sum(seconds[k] for k in ("mesh", "assemble", "modes", "invariants", "stiffening", "certificate",
+                                          "richer"))
         self.assertTrue(0 < stages <= seconds["total"])
         seen = json.loads(flexboom("inspect", body, "--json").stdout)
         self.assertEqual(seen["mass"], document["mass"])
@@ -1226,6 +1227,64 @@ class Reduce(Case):
         self.assertIn("changed", result.stderr)
         body.write_bytes(data[:1000])
         self.assert_exit(INPUT, flexboom("inspect", body))
+
+    SCENE = """format = "flexboom-scene-1"
+name = "kept"
+duration = 0.3
+output_step = 0.01
+accuracy = { tolerance = 1e-3 }
+[hub]
+mass = 0.5
+inertia = [[2e-3, 0, 0], [0, 2e-3, 0], [0, 0, 2e-3]]
+[[bodies]]
+name = "boom"
+%s
+[[hinges]]
+body = "boom"
+point = [0.05, 0, 0]
+stowed = [0, 1, 0]
+outward = [1, 0, 0]
+stiffness = 5
+rest = 1.5
+start_angle = 1.0
+"""
+
+    def budget(self, body):
+        scene = self.folder / "kept.toml"
+        scene.write_text(self.SCENE % body)
+        result = flexboom("run", scene, "--json", "--out", self.folder / "results")
+        self.assert_exit(OK, result)
+        return json.loads(result.stdout)["error_budget"]
+
+    def test_the_file_tells_the_errors_of_a_run(self):
+        coarse = self.folder / "coarse.toml"  # elements of order 3
+        coarse.write_text(re.sub(r"(?m)^order = .*$", "order = 3", BOOM4.read_text()))
+        for model, order in ((BOOM4, None), (coarse, 3)):
+            body = self.folder / "body.h5"
+            arguments = ("reduce", model, "-o", body, "--count", "4", "--json")
+            self.assert_exit(OK, flexboom(*arguments))
+            errors = json.loads(flexboom("inspect", body, "--json").stdout)["errors"]
+            self.assertEqual(errors["more_modes"], 12)
+            self.assertGreater(errors["finer_elements"], 0)
+            of_file = self.budget(f'file = "{body}"')
+            of_model = self.budget(f'file = "{model}"\nmodes = 4\ndirections = "all"\nstiffening = "auto"')
+            for part in ("truncation", "discretisation", "time", "linearisation", "total"):
+                self.assertIsNotNone(of_file[part], part)
+            # eight modes more against four
+            self.assertLess(abs(math.log(of_file["truncation"] / of_model["truncation"])), math.log(1.5))
+            if order:
+                self.assertGreater(of_model["discretisation"], 1e-7)
+                # one step of the elements, twice, against two steps
+                self.assertTrue(0.9 < of_file["discretisation"] / of_model["discretisation"] < 2.2)
+        self.assert_exit(OK, flexboom(*arguments, "--errors", "none"))
+        of_file = self.budget(f'file = "{body}"')
+        self.assertIsNone(of_file["truncation"])
+        self.assertIsNone(of_file["discretisation"])
+        self.assertEqual(json.loads(flexboom("inspect", body, "--json").stdout)["errors"]["more_modes"], None)
+        self.assert_exit(OK, flexboom(*arguments, "--errors", "modes"))
+        of_file = self.budget(f'file = "{body}"')
+        self.assertIsNotNone(of_file["truncation"])
+        self.assertIsNone(of_file["discretisation"])
 
     def test_every_export_is_read_back(self):
         clamped = self.reduce("--count", "4", "--damping", "modal:0.01")[0].rename(self.folder / "clamped.h5")

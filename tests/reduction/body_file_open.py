@@ -43,15 +43,21 @@ def texts(d):
 
 def check(path):
     data = Path(path).read_bytes()
-    head = f"flexboom-body 1 sha256 {hashlib.sha256(data[SEAL:]).hexdigest()}\n".encode()
+    version = int(data.split()[1])  # 2: with a body of more modes, the same one here
+    head = f"flexboom-body {version} sha256 {hashlib.sha256(data[SEAL:]).hexdigest()}\n".encode()
     assert data[:SEAL] == head.ljust(SEAL, b"\0")
 
     f = h5py.File(path)
     n, points = 4, 5
     assert f.userblock_size == SEAL
     assert f.attrs["checksum"] == content_checksum(f)
-    attributes = {"format": "flexboom-body", "version": 1, "name": 'Ausleger α "4"\n', "structure": "solid",
+    attributes = {"format": "flexboom-body", "version": version, "name": 'Ausleger α "4"\n', "structure": "solid",
                   "frame": "free"}
+    if version == 2:
+        attributes |= {f"more_modes/{name}": attributes[name] for name in ("name", "structure", "frame")}
+        attributes |= {"more_modes": 1, "finer_elements": 0}
+        for name in datasets(f["more_modes"]):
+            assert np.array_equal(f[name][()], f["more_modes"][name][()], equal_nan=f[name].dtype.kind == "f"), name
     assert f.attrs.keys() == attributes.keys() | {"checksum"}
     for name, value in attributes.items():
         assert f.attrs[name] == value, name

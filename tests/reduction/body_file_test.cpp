@@ -249,9 +249,34 @@ TEST(BodyFile, EqualBodiesMakeEqualFiles) {
   }
 }
 
+TEST(BodyFile, RicherBodiesComeBackWhereTheyWereGiven) {
+  const Folder folder;
+  const fs::path path = folder.path / "body.h5";
+  const std::vector<ReducedBody> all = bodies();
+  const std::optional<ReducedBody> none, one = all.at(1), other = all.back();
+  for (const RicherBodies& richer : {RicherBodies{none, none}, {one, none}, {none, other}, {one, other}}) {
+    write_body_file(path, full_body(), richer);
+    const BodyFile file = read_whole_body_file(path);
+    EXPECT_TRUE(same(file.body, full_body()));
+    EXPECT_TRUE(same(read_body_file(path), full_body()));
+    const auto comes_back = [](const std::optional<ReducedBody>& a, const std::optional<ReducedBody>& b) {
+      return a ? b && same(*a, *b) : !b;
+    };
+    EXPECT_TRUE(comes_back(richer.more_modes, file.richer.more_modes));
+    EXPECT_TRUE(comes_back(richer.finer_elements, file.richer.finer_elements));
+    // What an older program cannot read has another version.
+    EXPECT_TRUE(text_of(path).starts_with(richer.empty() ? "flexboom-body 1 " : "flexboom-body 2 "));
+  }
+  RicherBodies bad{one, none};
+  bad.more_modes->m = -1;
+  EXPECT_TRUE(says(message([&] { write_body_file(path, full_body(), bad); }), "m must be positive"));
+}
+
 TEST(BodyFile, PythonSeesTheDocumentedArrays) {
   const Folder folder;
   write_body_file(folder.path / "full.h5", full_body());
+  EXPECT_EQ(python("body_file_open.py", folder.path / "full.h5"), 0);
+  write_body_file(folder.path / "full.h5", full_body(), {.more_modes = full_body(), .finer_elements = {}});
   EXPECT_EQ(python("body_file_open.py", folder.path / "full.h5"), 0);
 }
 
@@ -324,8 +349,8 @@ TEST(BodyFile, OtherFilesAreRefused) {
   EXPECT_TRUE(says(message(read), "empty"));
   put_text(path, "*HEADING\n");
   EXPECT_TRUE(says(message(read), "not a reduced body"));
-  put_text(path, "flexboom-body 2 sha256 0\n");
-  EXPECT_TRUE(says(message(read), "version 2")) << message(read);
+  put_text(path, "flexboom-body 3 sha256 0\n");
+  EXPECT_TRUE(says(message(read), "version 3")) << message(read);
   put_text(path, "flexboom-body 1 sha256 0\n");
   EXPECT_TRUE(says(message(read), "cut off")) << message(read);
   EXPECT_NE(message([&] { read_body_file(folder.path); }), "");
