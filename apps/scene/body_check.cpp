@@ -257,7 +257,7 @@ void check_stiffening(Faults& faults, const std::string& path, const BodyScene& 
 }
 
 /// The set that a name up to `end` is, where it differs by case alone.
-void spell(std::string& text, size_t end, const std::vector<std::string_view>& sets) {
+void spell_set(std::string& text, size_t end, const std::vector<std::string_view>& sets) {
   const std::string name = text.substr(0, end);
   const auto like = [&name](std::string_view set) { return same_but_case(set, name); };
   if (std::ranges::find(sets, name) != sets.end() || std::ranges::count_if(sets, like) != 1) return;
@@ -268,10 +268,10 @@ void spell(std::string& text, size_t end, const std::vector<std::string_view>& s
 
 void spell_sets(BodyScene& body) {
   const std::vector<std::string_view> sets = sets_of(body);
-  spell(body.clamp, std::string::npos, sets);
-  spell(body.basis.reference, std::string::npos, sets);
-  for (std::string& text : body.basis.interfaces) spell(text, text.find(':'), sets);
-  for (std::string& text : body.basis.corrections) spell(text, text.rfind('.'), sets);
+  spell_set(body.clamp, std::string::npos, sets);
+  spell_set(body.basis.reference, std::string::npos, sets);
+  for (std::string& text : body.basis.interfaces) spell_set(text, text.find(':'), sets);
+  for (std::string& text : body.basis.corrections) spell_set(text, text.rfind('.'), sets);
 }
 
 bool is_tapered(const BeamSegment& segment) {
