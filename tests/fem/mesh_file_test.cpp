@@ -1,5 +1,6 @@
 #include "fem/formats/mesh_formats.hpp"
 
+#include "fem/base/check.hpp"
 #include "fem/base/files.hpp"
 #include "fem/base/text_reader.hpp"
 #include "fem/formats/abaqus/write.hpp"
