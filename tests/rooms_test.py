@@ -1,4 +1,5 @@
 """No include points up. Folders: fem <- reduction <- dynamics <- apps. Inside each, a room includes only those listed.
+Documents that are named exist, and so do their sections.
 
 Usage: rooms_test.py PROJECT_FOLDER
 """
@@ -101,11 +102,59 @@ def cycle(known):
     return next((room for room in known if room in below(room, set())), None)
 
 
+TOLD = (".hpp", ".cpp", ".py", ".md", ".toml")
+DOCUMENT = re.compile(r"(?<![}\w/])[\w.][\w./-]*\.md\b")
+SECTION = re.compile(r"\b(?:[Ss]ection|[Cc]hapter) (\d+)\b(?!\.\d)")
+HEADING = re.compile(r"^## (\d+) ", re.MULTILINE)
+LITERATURE = re.compile(r"^## (?:References|Literature)$.*", re.MULTILINE | re.DOTALL)
+# Of those who work on the project, not part of it; in two halves, so that they are not named here.
+ELSEWHERE = [a + b for a, b in (("FORM", "ULATION"), ("DES", "IGN." "md"), ("INTER", "FACE." "md"), ("ST", "YLE." "md"),
+                                ("HARD", "_CASES"))]
+
+
+def files_told(project):
+    for top in sorted(project.iterdir()):
+        if top.name in ("build", "results") or top.name.startswith("."):
+            continue
+        for file in sorted(top.rglob("*") if top.is_dir() else [top]):
+            if file.suffix in TOLD:
+                yield file
+
+
+def document_faults(project):
+    """Documents and sections that are named and are not there."""
+    files = list(files_told(project))
+    there = {f.resolve() for f in files}
+
+    def found(name, file):
+        top = project / file.relative_to(project).parts[0]
+        for folder in (file.parent, top, project):
+            if (folder / name).resolve() in there:
+                return folder / name
+        return next((f for f in files if f.as_posix().endswith("/" + name)), None)
+
+    for file in files:
+        own = file.relative_to(project)
+        text = file.read_text(errors="replace")
+        for word in ELSEWHERE:
+            if word in text:
+                yield f"{own}: names {word}, which is no part of the project"
+        for number, line in enumerate(LITERATURE.sub("", text).splitlines(), 1):
+            named = DOCUMENT.findall(line)
+            for name in named:
+                if found(name, file) is None:
+                    yield f"{own}:{number}: names {name}, which does not exist"
+            for section in SECTION.findall(line):
+                readme = next(filter(None, (found(n, file) for n in named)), project / own.parts[0] / "README.md")
+                if not readme.is_file() or section not in HEADING.findall(readme.read_text()):
+                    yield f"{own}:{number}: {readme} has no section {section}"
+
+
 def main():
     project = pathlib.Path(sys.argv[1])
-    found = list(faults(project))
+    found = list(faults(project)) + list(document_faults(project.resolve()))
     found += [f"{folder}: room {cycle(known)} is above itself" for folder, known in ROOMS.items() if cycle(known)]
-    print("\n".join(found) or "every include points down")
+    print("\n".join(found) or "every include points down, and every document that is named is there")
     return 1 if found else 0
 
 

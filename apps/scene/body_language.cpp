@@ -4,6 +4,7 @@
 #include "apps/scene/keys.hpp"
 #include "apps/scene/scene_checks.hpp"
 #include "apps/scene/scene_keys.hpp"
+#include "fem/booms/solid_boom.hpp"
 #include "reduction/eigen/solver.hpp"
 
 #include <fmt/format.h>
@@ -52,6 +53,12 @@ void element_count(Faults& faults, const std::string& path, const int& elements,
 
 void order(Faults& faults, const std::string& path, const int& value, std::string_view) {
   from_to(faults, path, value, 1, 12, "");
+}
+
+void mesh_accuracy(Faults& faults, const std::string& path, const double& value, std::string_view) {
+  if (!(value >= best_mesh_accuracy && value < 1))
+    faults.add(path, fmt::format("is {}; it must be {:g} or more, the best that is known of a mesh, and less than 1",
+                                 value, best_mesh_accuracy));
 }
 
 void shear_coefficient(Faults& faults, const std::string& path, const NumberOrWord& shear, std::string_view unit) {
@@ -167,7 +174,7 @@ void solid_keys(Archive& a, SolidOptions& o) {
       {"accuracy", "",
        "relative error wanted in the frequencies, 1e-8 or more; a mesh left open starts by it, and `modes` refines it "
        "until it is met"},
-      o.accuracy);
+      o.accuracy, mesh_accuracy);
   a.key({"order", "", "of `\"hex\"`, 1 to 8; 0: chosen"}, o.order);
   a.key({"slit", "m", "width of a slit along every tube, at +y, on the midline of the wall; 0: closed"}, o.slit);
   a.table({"grading", "", "Sizes of the elements."}, o.grading, grading_keys);
@@ -261,6 +268,7 @@ void geometry_keys(Archive& a, BodyScene& b) {
   const double length = a.reader() ? g.length() : 0;
   a.tables({"attachments", "", "Rigid bodies fixed to the boom."}, g.attachments,
            [length](Archive& below, RigidAttachment& r) { attachment_keys(below, r, length); });
+  if (a.reader()) spell_sets(b);
 }
 
 void reduced_keys(Archive& a, BodyScene& b) {
@@ -301,7 +309,10 @@ void body_keys(Archive& a, BodyScene& b) {
   if (reader && !b.modes_given && b.structure != "rigid") b.modes_auto = true;
   if (reader && b.structure == "rigid" && reader->has("modes"))
     reader->reading().warnings.push_back(reader->table().path("modes") + ": has no effect with structure = \"rigid\"");
-  if (reader && reader->has("file")) return reader->hint(" (its geometry comes from the body file)");
+  if (reader && reader->has("file")) {
+    spell_sets(b);
+    return reader->hint(" (its geometry comes from the body file)");
+  }
   geometry_keys(a, b);
 }
 

@@ -90,12 +90,12 @@ void write_out_shorthand(Scene& scene) {
   scene.start_rate.setZero(), scene.start_velocity.setZero();
 }
 
+}  // namespace
+
 bool same_but_case(std::string_view a, std::string_view b) {
   return std::ranges::equal(
       a, b, {}, [](unsigned char c) { return std::tolower(c); }, [](unsigned char c) { return std::tolower(c); });
 }
-
-}  // namespace
 
 void read_file_of_body(TableReader& entry, Reading& reading, BodyScene& body) {
   const auto fault = [&](const std::string& text) {

@@ -175,7 +175,7 @@ void check_shorthand(const Scene& scene, Faults& faults) {
   check_keys(faults, "", scene, shorthand_keys);
   check_hub(faults, scene);
   for (size_t i = 0; i < scene.bodies.size(); ++i)
-    if (scene.bodies[i].name == "hub" && !scene.hub.fixed)
+    if (scene.bodies[i].name == "hub")
       faults.add(fmt::format("bodies[{}].name", i), "\"hub\" is the body of [hub]; choose another");
   for (size_t i = 0; i < scene.hinges.size(); ++i) check_hinge(faults, fmt::format("hinges[{}]", i), scene.hinges[i]);
   if (body_names_known(faults, scene)) check_hinge_bodies(faults, scene);

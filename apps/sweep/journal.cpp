@@ -3,6 +3,7 @@
 #include "apps/sweep/journal.hpp"
 
 #include "fem/base/check.hpp"
+#include "fem/base/files.hpp"
 #include "reduction/body_file/sha256.hpp"
 
 #include <fmt/format.h>
@@ -21,7 +22,7 @@ using nlohmann::ordered_json;
 
 namespace {
 
-constexpr const char* journal_format = "flexboom-sweep-1";
+constexpr const char* journal_format = "flexboom-sweep-2";
 
 /// Name, value: what must be the same for two parts of one sweep.
 ordered_json facts_of(const SweepIdentity& id) {
@@ -50,6 +51,19 @@ SweepIdentity identity_of(const ordered_json& facts) {
   facts.at("loads").get_to(id.loads), facts.at("trajectories").get_to(id.trajectories);
   facts.at("quantities").get_to(id.quantities);
   return id;
+}
+
+/// SHA-256 of what is stored of a run, `count` quantities: SQLite knows neither NaN nor the sign of zero.
+std::string digest_of(const RunOutcome& o, size_t count) {
+  const auto text_of = [](double v) { return std::isnan(v) ? std::string("none") : fmt::format("{:.17g}", v + 0.0); };
+  std::string text = fmt::format("{}\n{}\n{}", o.run, run_status_names[static_cast<size_t>(o.status)], o.message);
+  text += '\n' + text_of(o.seconds);
+  for (size_t i = 0; i < count; ++i) text += '\n' + (i < o.quantities.size() ? text_of(o.quantities[i]) : "none");
+  return sha256(text);
+}
+
+std::string digest_of(size_t run, std::string_view names, size_t rows, std::string_view bytes) {
+  return sha256(fmt::format("{}\n{}\n{}\n", run, names, rows).append(bytes));
 }
 
 }  // namespace
@@ -112,6 +126,8 @@ void Journal::Close::operator()(sqlite3* database) const { sqlite3_close(databas
 namespace {
 
 sqlite3* opened_database(const std::filesystem::path& file, int flags) {
+  std::error_code none;
+  if (std::filesystem::exists(file, none)) require_regular_file(file, std::numeric_limits<size_t>::max());
   sqlite3* database = nullptr;
   const int code = sqlite3_open_v2(file.c_str(), &database, flags, nullptr);
   if (code != SQLITE_OK) {
@@ -144,6 +160,7 @@ Journal::Journal(const std::filesystem::path& file, const SweepIdentity& identit
   require(identity_.shard == identity.shard,
           fmt::format("--resume: {} is of shard {}/{}, not {}/{}", file.string(), identity_.shard.part,
                       identity_.shard.of, identity.shard.part, identity.shard.of));
+  outcomes();  // a row that was changed is found before others are simulated
 }
 
 Journal::Journal(const std::filesystem::path& file) : file_(file) {
@@ -169,9 +186,11 @@ void Journal::write_identity() {
   add_all([&] {
     run_sql("CREATE TABLE sweep (sha256 TEXT, facts TEXT, shard INTEGER, shards INTEGER)");
     run_sql("CREATE TABLE quantities (number INTEGER PRIMARY KEY, name TEXT)");
+    run_sql(fmt::format(
+        "CREATE TABLE runs (run INTEGER PRIMARY KEY, sha256 TEXT, status TEXT, message TEXT, seconds REAL{})",
+        columns));
     run_sql(
-        fmt::format("CREATE TABLE runs (run INTEGER PRIMARY KEY, status TEXT, message TEXT, seconds REAL{})", columns));
-    run_sql("CREATE TABLE trajectories (run INTEGER PRIMARY KEY, names TEXT, rows INTEGER, by_columns BLOB)");
+        "CREATE TABLE trajectories (run INTEGER PRIMARY KEY, sha256 TEXT, names TEXT, rows INTEGER, by_columns BLOB)");
     for (size_t i = 0; i < identity_.quantities.size(); ++i)
       Statement(*this, "INSERT INTO quantities VALUES (?, ?)").bind(1, i + 1).bind(2, identity_.quantities[i]).step();
     Statement(*this, "INSERT INTO sweep VALUES (?, ?, ?, ?)")
@@ -214,21 +233,27 @@ void Journal::add_all(const std::function<void()>& adding) {
 void Journal::add(const RunOutcome& outcome) {
   const auto insert = [&] {
     const size_t count = identity_.quantities.size();
-    std::string places = "?, ?, ?, ?";
+    std::string places = "?, ?, ?, ?, ?";
     for (size_t i = 0; i < count; ++i) places += ", ?";
     Statement row(*this, fmt::format("INSERT INTO runs VALUES ({})", places));
-    row.bind(1, outcome.run).bind(2, run_status_names[static_cast<size_t>(outcome.status)]);
-    row.bind(3, outcome.message).bind(4, outcome.seconds);
+    row.bind(1, outcome.run).bind(2, digest_of(outcome, count));
+    row.bind(3, run_status_names[static_cast<size_t>(outcome.status)]);
+    row.bind(4, outcome.message).bind(5, outcome.seconds);
     for (size_t i = 0; i < std::min(count, outcome.quantities.size()); ++i)  // what is not bound is NULL
-      row.bind(static_cast<int>(i) + 5, outcome.quantities[i]);
+      row.bind(static_cast<int>(i) + 6, outcome.quantities[i]);
     row.step();
     if (!outcome.trajectory) return;
     const OutputTable& t = *outcome.trajectory;
-    Statement(*this, "INSERT INTO trajectories VALUES (?, ?, ?, ?)")
+    const std::string names = ordered_json(t.names).dump();
+    const auto rows = static_cast<size_t>(t.values.rows());
+    const std::string_view bytes(reinterpret_cast<const char*>(t.values.data()),
+                                 static_cast<size_t>(t.values.size()) * sizeof(double));
+    Statement(*this, "INSERT INTO trajectories VALUES (?, ?, ?, ?, ?)")
         .bind(1, outcome.run)
-        .bind(2, ordered_json(t.names).dump())
-        .bind(3, static_cast<size_t>(t.values.rows()))
-        .bind_bytes(4, t.values.data(), static_cast<size_t>(t.values.size()) * sizeof(double))
+        .bind(2, digest_of(outcome.run, names, rows, bytes))
+        .bind(3, names)
+        .bind(4, rows)
+        .bind_bytes(5, bytes.data(), bytes.size())
         .step();
   };
   // A statement by itself is a transaction by itself.
@@ -252,25 +277,27 @@ std::vector<RunOutcome> Journal::outcomes() const {
   while (rows.step()) {
     RunOutcome& o = outcomes.emplace_back();
     o.run = rows.whole(0);
-    const auto found = status.find(rows.text(1));
-    require(found != status.end(), fmt::format("{}: run {} has status '{}'", file_.string(), o.run, rows.text(1)));
+    const auto found = status.find(rows.text(2));
+    require(found != status.end(), fmt::format("{}: run {} has status '{}'", file_.string(), o.run, rows.text(2)));
     o.status = found->second;
-    o.message = rows.text(2), o.seconds = rows.number(3);
+    o.message = rows.text(3), o.seconds = rows.number(4);
     for (size_t i = 0; i < identity_.quantities.size(); ++i)
-      o.quantities.push_back(rows.number(static_cast<int>(i) + 4));
+      o.quantities.push_back(rows.number(static_cast<int>(i) + 5));
+    require(rows.text(1) == digest_of(o, o.quantities.size()),
+            fmt::format("{}: what it says of run {} was changed: the checksum differs", file_.string(), o.run));
   }
   return outcomes;
 }
 
 std::optional<OutputTable> Journal::trajectory(size_t run) const {
-  Statement row(*this, "SELECT names, rows, by_columns FROM trajectories WHERE run = ?");
+  Statement row(*this, "SELECT sha256, names, rows, by_columns FROM trajectories WHERE run = ?");
   if (!row.bind(1, run).step()) return {};
+  const std::string names = row.text(1), bytes = row.bytes(3);
+  require(row.text(0) == digest_of(run, names, row.whole(2), bytes),
+          fmt::format("{}: the trajectory of run {} was changed: the checksum differs", file_.string(), run));
   OutputTable table;
-  table.names = ordered_json::parse(row.text(0)).get<std::vector<std::string>>();
-  const std::string bytes = row.bytes(2);
-  const auto rows = static_cast<Eigen::Index>(row.whole(1)), columns = std::ssize(table.names);
-  require(bytes.size() == static_cast<size_t>(rows * columns) * sizeof(double),
-          fmt::format("{}: the trajectory of run {} is cut off", file_.string(), run));
+  table.names = ordered_json::parse(names).get<std::vector<std::string>>();
+  const auto rows = static_cast<Eigen::Index>(row.whole(2)), columns = std::ssize(table.names);
   table.values = Eigen::Map<const Eigen::MatrixXd>(reinterpret_cast<const double*>(bytes.data()), rows, columns);
   return table;
 }

@@ -14,7 +14,6 @@
 namespace flexboom {
 namespace {
 
-constexpr double best_accuracy = 1e-8;  // the last rows of `choices`
 constexpr int max_solid_order = 8;
 // A quarter of a circle in one element of degree p: quadratic fields (the contraction across in bending) are sines of
 // twice the angle, which polynomials follow better when nodes lie slightly nearer the middle. With p = 4 the bending
@@ -255,9 +254,9 @@ void validate(const BeamGeometry& boom, const SolidOptions& options) {
     });
   }
   validate_slit(boom, options.slit);
-  require(options.accuracy >= best_accuracy && options.accuracy < 1,
+  require(options.accuracy >= best_mesh_accuracy && options.accuracy < 1,
           fmt::format("accuracy is {}; it must be {:g} or more, the best that is known of a mesh, and less than 1",
-                      options.accuracy, best_accuracy));
+                      options.accuracy, best_mesh_accuracy));
   require_at_least(options.order, 0, max_solid_order, "order");
   const SolidGrading& g = options.grading;
   require_at_least(g.sectors, 0, max_divisions, "grading: sectors");

@@ -19,6 +19,9 @@ struct SolidGrading {
   double factor = 0;       // of each of them, in (0, 1)
 };
 
+/// The best that is known of a mesh: that of the finest which SolidOptions choose.
+constexpr double best_mesh_accuracy = 1e-8;
+
 /// How make_solid_mesh meshes a boom.
 struct SolidOptions {
   std::string element = "hex";  // or hex8, hex8-reduced, hex20, hex20-reduced, hex27, tet4, tet10

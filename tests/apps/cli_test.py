@@ -227,20 +227,33 @@ class BadInput(Case):
         pipe = self.folder / "pipe"
         os.mkfifo(pipe)
         for source in (pipe, pathlib.Path("/dev/zero")):
-            for command, extension in (("check", "toml"), ("run", "toml"), ("modes", "toml"), ("modes", "inp"),
-                                       ("modes", "bdf"), ("modes", "msh"), ("modes", "vtu"), ("modes", "geo"),
-                                       ("reduce", "inp"), ("compare", "toml")):
-                link = self.folder / f"{source.name}.{extension}"
-                if not link.is_symlink():
-                    link.symlink_to(source)
-                self.assert_refused(command, link, *(("-o", "x.h5") if command == "reduce" else ()),
-                                    words=": it is a device, pipe or socket, not a file")
+            named = {e: self.folder / f"{source.name}.{e}" for e in ("toml", "inp", "bdf", "msh", "vtu", "geo", "h5")}
+            for link in named.values():
+                link.symlink_to(source)
+            toml, body = named["toml"], named["h5"]
+            for command in (*(["modes", named[e]] for e in ("toml", "inp", "bdf", "msh", "vtu", "geo")),
+                            ["check", toml], ["run", toml], ["run", "sport", "--plan", toml],
+                            ["run", "sport", "--continue", toml], ["compare", toml],
+                            ["sweep", toml, "--vary", "duration=1"], ["reduce", toml, "-o", "x.h5"],
+                            ["reduce", named["inp"], "-o", "x.h5"], ["mesh", named["inp"], "-o", "x.vtu"],
+                            ["inspect", body], ["export", body, "--to", "sid", "-o", "x.sid"]):
+                self.assert_refused(*command, words=": it is a device, pipe or socket, not a file")
         scene = self.folder / "scene.toml"
         text = (MESHES / "panel-slew.toml").read_text()
         scene.write_text(text + '\n[[bodies]]\nname = "extra"\nfile = "body.h5"\n'
                          '[[joints]]\nname = "extra"\nkind = "fixed"\nb = { body = "extra", marker = "root" }\n')
         (self.folder / "body.h5").symlink_to(pipe)
         self.assert_refused("check", scene, words="it is a device, pipe or socket, not a file")
+
+    def test_only_files_of_a_folder_are_reported(self):
+        good = self.run_sport("--duration", "0.1", out="good")
+        for name in ("scene.toml", "summary.json", "trajectory.csv"):
+            for device in (os.mkfifo, lambda path: os.symlink("/dev/zero", path)):
+                bad = shutil.copytree(good, self.folder / "bad")
+                (bad / name).unlink()
+                device(bad / name)
+                self.assert_refused("report", bad, words=f"{bad / name}: it is a device, pipe or socket, not a file")
+                shutil.rmtree(bad)
 
     def test_large_scenes_are_checked_in_little_memory(self):
         def checked(text, code, words):
@@ -657,6 +670,12 @@ class TreeScenes(Case):
         self.assertFalse(self.summary(folder)["accuracy_met"])
         self.assertIn("momentum drift not measured", result.stdout)
         self.assertIn("<tr><th>momentum drift</th><td>not measured</td></tr>", (folder / "report.html").read_text())
+        scene = self.folder / "orbit.toml"
+        scene.write_text(re.sub(r"(?m)^\[orbit\].*$", '[orbit]\ngravity = "differential"',
+                                (MESHES / "sport.toml").read_text()))
+        for formulation in ("relative", "multipliers"):
+            folder = self.run_scene(scene, "--duration", "0.05", "--formulation", formulation, out=formulation)
+            self.assertIsNone(self.summary(folder)["momentum_drift"], formulation)
 
     def test_resolved_scene_repeats_the_run(self):
         for name in ("two-link-arm", "panel-slew", "wire-spinner"):
@@ -1102,6 +1121,11 @@ class Modes(Case):
         np.testing.assert_allclose(self.modes(BOOM4, "--clamp", "tip")["frequencies_hz"],
                                    self.modes(BOOM4)["frequencies_hz"], rtol=1e-9)
 
+    def test_clamp_compares_without_case(self):
+        for name in ("root", "tip"):
+            self.assertEqual(self.modes(BOOM4, "--clamp", name.upper())["frequencies_hz"],
+                             self.modes(BOOM4, "--clamp", name)["frequencies_hz"])
+
     def test_material_scales_the_frequencies(self):
         scaled = self.modes(BOOM4, "--material", "268e9,0.33,2840")["frequencies_hz"]
         np.testing.assert_allclose(scaled, 2 * np.array(self.modes(BOOM4)["frequencies_hz"]), rtol=1e-9)  # sqrt(E)
@@ -1185,7 +1209,23 @@ class Reduce(Case):
     def test_hinge_basis(self):
         document = self.reduce("--basis", "hinge", "--hinge-stiffness", "0.22,30")[1]
         self.assertEqual(len(document["coordinates"]), 2)
-        self.assertEqual(self.failed(document), [])
+        for count in (1, 2, 3):
+            document = self.reduce("--basis", "hinge", "--hinge-stiffness", "0.22,30", "--count", count)[1]
+            self.assertEqual(self.failed(document), [], count)
+            self.assertEqual(len(document["coordinates"]), 2 * count)
+
+    def test_names_of_node_sets_compare_without_case(self):
+        """Decks write them in capitals."""
+        for arguments in (("--loads-at", "tip"), ("--attach", "tip.Fy"), ("--select", "output:tip.uy,0.9"),
+                          ("--basis", "craig-bampton", "--interface", "root", "--interface", "tip:distributing",
+                           "--reference", "root")):
+            capitals = [re.sub("root|tip", lambda name: name[0].upper(), a) for a in arguments]
+            body, document = self.reduce("--count", "4", *arguments)
+            data = body.read_bytes()
+            again, same = self.reduce("--count", "4", *capitals)
+            self.assertNotEqual(capitals, list(arguments))
+            self.assertEqual(again.read_bytes(), data, arguments)
+            self.assertEqual(same["checks"], document["checks"])
 
     def test_prestressed_basis(self):
         document = self.reduce("--basis", "prestressed", "--spin", "0,0,30", "--acceleration=-90,0,0", "--turns", "z",

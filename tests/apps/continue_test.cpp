@@ -1,5 +1,6 @@
 // A run that goes on from where another one ended is the same run.
 
+#include "apps/commands/commands.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
 
@@ -226,6 +227,9 @@ TEST(ContinueState, BadFilesAreRefusedWithTheirPlace) {
     }
   }
 }
+
+// What is promised of a run that is killed.
+TEST(Checkpoints, AreTenSecondsApart) { EXPECT_EQ(RunArguments().checkpoint, 10); }
 
 }  // namespace
 }  // namespace flexboom

@@ -1,8 +1,10 @@
 """Sweeps: which values, what survives a kill, shards, failures, results. Usage: sweep_test.py PROGRAM [unittest arguments]"""
 
 import concurrent.futures
+import contextlib
 import json
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -231,6 +233,50 @@ class Journal(Case):
             self.assertIn(word, result.stderr)
         self.sweep(*draw, "--resume")
         self.assertEqual(self.bytes(folder), before)
+
+
+    def changed(self, folder, how):
+        """A copy of the folder whose journal was changed behind the program's back."""
+        copy = shutil.copytree(folder, self.folder / "changed", dirs_exist_ok=True)
+        with contextlib.closing(sqlite3.connect(copy / "sweep.sqlite")) as journal:
+            self.assertGreater(journal.execute(how).rowcount, 0, how)
+            journal.commit()
+        return copy
+
+    def test_a_journal_that_was_changed_is_refused(self):
+        draw = ["--vary", "hub.mass=normal:9:0.5", "-n", "3", "--trajectories", *POINTING]
+        folder = self.sweep(*draw)
+        facts = lambda old, new: f"UPDATE sweep SET facts = replace(facts, '{old}', '{new}') WHERE facts LIKE '%{old}%'"
+        for how, words in (
+                (facts('"seed":1', '"seed":2'), "the checksum differs"),
+                (facts("normal:9", "normal:8"), "the checksum differs"),
+                (facts("flexboom-sweep-2", "flexboom-sweep-3"),
+                 'its format is "flexboom-sweep-3"; this version reads "flexboom-sweep-2"'),
+                ("UPDATE sweep SET facts = 'none'", "is no journal"),
+                ("DELETE FROM sweep", "is empty"),
+                ("UPDATE runs SET q1 = q1 * 1.000000001 WHERE run = 1", "run 1 was changed"),
+                ("UPDATE runs SET q1 = NULL WHERE run = 1", "run 1 was changed"),
+                ("UPDATE runs SET status = 'input' WHERE run = 2", "run 2 was changed"),
+                ("UPDATE runs SET message = 'mine' WHERE run = 0", "run 0 was changed"),
+                ("UPDATE trajectories SET by_columns = zeroblob(length(by_columns)) WHERE run = 2",
+                 "the trajectory of run 2 was changed")):
+            bad = self.changed(folder, how)
+            for command in (["sport", *SHORT, *draw, "--resume", "--out", bad],
+                            ["--merge", bad, "--out", self.folder / "merged"]):
+                result = flexboom("sweep", *command)
+                self.assert_exit(INPUT, result)
+                self.assertIn(words, result.stderr, how)
+                shutil.rmtree(self.folder / "merged", ignore_errors=True)
+
+    def test_only_files_are_read(self):
+        for device in (os.mkfifo, lambda path: os.symlink("/dev/zero", path)):
+            folder = self.folder / "out"
+            folder.mkdir()
+            device(folder / "sweep.sqlite")
+            result = flexboom("sweep", "sport", *SHORT, "--vary", "hub.mass=8", "--resume", "--out", folder, timeout=20)
+            self.assert_exit(INPUT, result)
+            self.assertIn("sweep.sqlite: it is a device, pipe or socket, not a file", result.stderr)
+            shutil.rmtree(folder)
 
 
 class Shards(Case):

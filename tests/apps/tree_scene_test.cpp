@@ -6,6 +6,7 @@
 #include "tests/apps/scene_testing.hpp"
 
 #include "fem/base/check.hpp"
+#include "fem/base/files.hpp"
 #include "reduction/body_file/body_file.hpp"
 
 #include <gtest/gtest.h>
@@ -109,6 +110,67 @@ TEST(TreeScene, TakesBodiesReducedBefore) {
   };
   EXPECT_EQ(end(again), end(plain));  // every bit of the file comes back
   std::filesystem::remove(file);
+}
+
+/// The scene with its one body taken from "boom.h5" beside it.
+std::string from_file(std::string text) {
+  const size_t body = text.find("[[bodies]]"), end = text.find("[hub]");
+  return text.replace(body, end - body, "[[bodies]]\nname = \"boom\"\nfile = \"boom.h5\"\n");
+}
+
+// A hinge carries a reduced body as one of [[joints]] does.
+TEST(TreeScene, HingesCarryBodiesReducedBefore) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("hinged." + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path file = folder / "boom.h5";
+  Scene plain = parse_scene(swing_on_hinge, "scene.toml");
+  write_body_file(file, prepare_body(plain.bodies[0]).body);
+  Scene reduced = parse_scene(from_file(swing_on_hinge), "scene.toml", folder);
+  plain.error_budget = reduced.error_budget = false;
+  plain.tolerance = reduced.tolerance = 1e-8;
+  const RunResult a = run_scene(plain, {}), b = run_scene(reduced, {});
+  for (const char* name : {"boom.angle", "boom.tip.y", "boom.q1"}) {
+    const double size = column(a, name).cwiseAbs().maxCoeff();
+    EXPECT_GT(size, 0) << name;
+    EXPECT_LT((column(a, name) - column(b, name)).cwiseAbs().maxCoeff(), 1e-4 * size) << name;  // stiffening
+  }
+
+  std::string bytes = file_bytes(file);
+  bytes[bytes.size() / 2] ^= 1;
+  for (const std::string& damaged : {bytes, bytes.substr(0, bytes.size() / 2), std::string("no body")}) {
+    write_file(file, damaged);
+    std::string fault;
+    try {
+      parse_scene(from_file(swing_on_hinge), "scene.toml", folder);
+    } catch (const InputError& error) {
+      fault = error.what();
+    }
+    EXPECT_TRUE(fault.starts_with("scene.toml:")) << fault;
+    EXPECT_NE(fault.find("boom.h5"), std::string::npos) << fault;
+    EXPECT_EQ(fault.find("the line has"), std::string::npos) << fault;
+  }
+  std::filesystem::remove_all(folder);
+}
+
+// What a hinge lacks beside joints is a hub, and a body hangs on a hinge or on a joint.
+TEST(TreeScene, HingesBesideJointsNeedAHubAndABodyOfTheirOwn) {
+  const std::string hinge =
+      "[[hinges]]\nbody = \"boom\"\npoint = [0.05, 0, 0]\nstowed = [0, 1, 0]\noutward = [1, 0, 0]\nstiffness = 1\n";
+  const std::string without = fault_of(swing_on_joints + hinge);
+  EXPECT_NE(without.find("hub: is missing"), std::string::npos) << without;
+  EXPECT_EQ(without.find("point"), std::string::npos) << without;
+  const std::string other = with(with(swing_on_joints, "name = \"hub\"\nmass", "name = \"bus\"\nmass"),
+                                 "b = { body = \"hub\" }", "b = { body = \"bus\" }");
+  const std::string hub = "[hub]\nmass = 1\ninertia = [1, 1, 1]\n";
+  const std::string twice = fault_of(with(with(other, "name = \"hub\"\nkind", "name = \"bus\"\nkind"),
+                                          "a = { body = \"hub\"", "a = { body = \"bus\"") +
+                                     hub + hinge);
+  EXPECT_NE(twice.find("\"boom\" hangs on joint \"hinge\" already"), std::string::npos) << twice;
+  EXPECT_EQ(twice.find("point"), std::string::npos) << twice;
+  const std::string two_hubs = fault_of(swing_on_joints + "[hub]\nfixed = true\n" + hinge);
+  EXPECT_NE(two_hubs.find("bodies[1].name: \"hub\" is the body of [hub]; choose another"), std::string::npos)
+      << two_hubs;
 }
 
 TEST(TreeScene, TurnsAreReadCheckedAndWrittenBack) {

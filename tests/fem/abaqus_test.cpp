@@ -2,6 +2,7 @@
 
 #include "deck_testing.hpp"
 #include "fem/base/files.hpp"
+#include "fem/formats/abaqus/dialect.hpp"
 #include "fem/mesh/mesh_sets.hpp"
 
 #include <fmt/format.h>
@@ -456,6 +457,134 @@ TEST(Abaqus, SignsOfADialectCountWhereverTheyStand) {
     EXPECT_NEAR(area(more), pi * 0.04, 1e-14) << more;
   for (const std::string more : {"*NODE FILE, OUTPUT=3D\nU\n", "*STEP\n*STATIC, SOLVER=SPOOLES\n*END STEP\n"})
     EXPECT_NEAR(area(more), pi * 0.01, 1e-14) << more;
+  const Folder folder;
+  const std::string deck = (folder.path / "deck.inp").string();
+  write_file(folder.path / "part.inc", "*BOUNDARY\n1, ENCASTRE\n");
+  EXPECT_NEAR(section_area(read_abaqus(section + "*INCLUDE, INPUT=part.inc\n", deck).mesh), pi * 0.04, 1e-14);
+  write_file(folder.path / "part.inc", "*NODE FILE, OUTPUT=3D\nU\n");
+  EXPECT_NEAR(section_area(read_abaqus(section + "*INCLUDE, INPUT=part.inc\n", deck).mesh), pi * 0.01, 1e-14);
+}
+
+// The lines are as the manuals of the programs spell them.
+TEST(Abaqus, EverySignOfADialectIsSeen) {
+  for (const char* line : {"*RIGID BODY, NSET=S",
+                           "*RIGID BODY, ROT NODE=2",
+                           "*FREQUENCY, SOLVER=ARPACK",
+                           "*FREQUENCY, STORAGE=YES",
+                           "*FREQUENCY, GLOBAL=NO",
+                           "*FREQUENCY, CYCMPC=ACTIVE",
+                           "*FREQUENCY, ALPHA=-0.3",
+                           "*STATIC, SOLVER=SPOOLES",
+                           "*STEP, INCF=10",
+                           "*STEP, THERMAL NETWORK",
+                           "*BEAM SECTION, OFFSET1=0",
+                           "*BEAM SECTION, OFFSET2=0",
+                           "*BEAM SECTION, NODAL THICKNESS",
+                           "*BEAM GENERAL SECTION, MATERIAL=M",
+                           "*SOLID SECTION, NODAL THICKNESS",
+                           "*BOUNDARY, TIME DELAY=1",
+                           "*TIE, MULTISTAGE",
+                           "*ELEMENT, PARENT=P",
+                           "*NODE FILE, OUTPUT=3D",
+                           "*EL FILE, OUTPUT=3D",
+                           "*NODE OUTPUT, OUTPUT=2D",
+                           "*ELEMENT OUTPUT, OUTPUT=2D",
+                           "*NO ANALYSIS",
+                           "*VALUES AT INFINITY",
+                           "*ELEMENT, TYPE=B31R",
+                           "*ELEMENT, TYPE=b32r",
+                           "*BEAM SECTION, SECTION=CIRC\n0.1, 0.1",
+                           "** written by FreeCAD",
+                           "** PrePoMax",
+                           "** written by flexboom",
+                           "*HEADING\nmade with FreeCAD"}) {
+    const abaqus::DialectSigns signs = abaqus::dialect_signs(std::string(line) + "\n", "deck.inp");
+    EXPECT_TRUE(signs.calculix.starts_with("deck.inp:")) << line;
+    EXPECT_EQ(signs.abaqus, "") << line;
+  }
+  for (const char* line : {"*PART, NAME=P",
+                           "*INSTANCE, NAME=I",
+                           "*ASSEMBLY, NAME=A",
+                           "*PREPRINT, ECHO=NO",
+                           "*MATRIX GENERATE",
+                           "*MATRIX OUTPUT",
+                           "*MODAL OUTPUT",
+                           "*ENERGY OUTPUT",
+                           "*MONITOR",
+                           "*SECTION CONTROLS",
+                           "*HOURGLASS STIFFNESS",
+                           "*CONTACT CONTROLS",
+                           "*CONSTRAINT CONTROLS",
+                           "*SOLVER CONTROLS",
+                           "*OUTPUT, FIELD",
+                           "*OUTPUT, HISTORY",
+                           "*OUTPUT, VARIABLE=PRESELECT",
+                           "*NODE, SYSTEM=R",
+                           "*NSET, INTERNAL",
+                           "*NSET, INSTANCE=I",
+                           "*NSET, UNSORTED",
+                           "*ELSET, INTERNAL",
+                           "*ELSET, INSTANCE=I",
+                           "*SURFACE, INTERNAL",
+                           "*ELASTIC, MODULI=LONG TERM",
+                           "*ELASTIC, DEPENDENCIES=1",
+                           "*DENSITY, DEPENDENCIES=1",
+                           "*SOLID SECTION, CONTROLS=C",
+                           "*SOLID SECTION, REF NODE=1",
+                           "*SOLID SECTION, STACK DIRECTION=3",
+                           "*BEAM SECTION, TEMPERATURE=GRADIENTS",
+                           "*BEAM SECTION, POISSON=0.3",
+                           "*BEAM SECTION, ROTARY INERTIA=ISOTROPIC",
+                           "*BEAM SECTION, LUMPED=NO",
+                           "*BEAM GENERAL SECTION, DENSITY=1",
+                           "*BEAM GENERAL SECTION, POISSON=0.3",
+                           "*BEAM GENERAL SECTION, ROTARY INERTIA=EXACT",
+                           "*RIGID BODY, TIE NSET=S",
+                           "*RIGID BODY, POSITION=INPUT",
+                           "*RIGID BODY, ISOTHERMAL=YES",
+                           "*DISTRIBUTING, COUPLING=STRUCTURAL",
+                           "*DISTRIBUTING, WEIGHTING METHOD=LINEAR",
+                           "*TIE, TYPE=SURFACE TO SURFACE",
+                           "*TIE, NO ROTATION",
+                           "*TIE, CONSTRAINT RATIO=1",
+                           "*BOUNDARY, TYPE=VELOCITY",
+                           "*STEP, NAME=S",
+                           "*STEP, UNSYMM=NO",
+                           "*STEP, EXTRAPOLATION=LINEAR",
+                           "*STEP, CONVERT SDI=NO",
+                           "*FREQUENCY, EIGENSOLVER=LANCZOS",
+                           "*FREQUENCY, NORMALIZATION=MASS",
+                           "*FREQUENCY, SIM",
+                           "*FREQUENCY, ACOUSTIC COUPLING=OFF",
+                           "*FREQUENCY, DAMPING PROJECTION=ON",
+                           "*FREQUENCY, NUMBER INTERVAL=1",
+                           "*FREQUENCY, BIAS=1",
+                           "*FREQUENCY, PROPERTY EVALUATION=1",
+                           "*FREQUENCY, RESIDUAL MODES",
+                           "*BOUNDARY\n1, ENCASTRE",
+                           "*KINEMATIC\n1, 4",
+                           "*MPC\nTIE, 1, 2",
+                           "*MPC\nPIN, 1, 2",
+                           "*MPC\nlink, 1, 2",
+                           "** Generated by: Abaqus/CAE 2022"}) {
+    const abaqus::DialectSigns signs = abaqus::dialect_signs(std::string(line) + "\n", "deck.inp");
+    EXPECT_TRUE(signs.abaqus.starts_with("deck.inp:")) << line;
+    EXPECT_EQ(signs.calculix, "") << line;
+  }
+  const std::string both =
+      "*HEADING\n*NODE\n1, 1\n*ELEMENT, TYPE=B31\n1, 1, 2\n*BEAM SECTION, SECTION=CIRC\n0.1\n*BOUNDARY\n1, 1, 6\n"
+      "*KINEMATIC\n1, 3\n*MPC\nBEAM, 1, 2\n*TIE, NAME=T\n*RIGID BODY, ELSET=E, REF NODE=1\n*STEP\n*FREQUENCY\n10\n"
+      "*NODE FILE\nU\n*END STEP\n";
+  const abaqus::DialectSigns none = abaqus::dialect_signs(both, "deck.inp");
+  EXPECT_EQ(none.calculix + none.abaqus, "");
+}
+
+// Two numbers are a sign of CalculiX, and no reason to overlook those of Abaqus.
+TEST(Abaqus, CircleOfTwoNumbersInADeckOfAbaqusIsNeverGuessed) {
+  const std::string two = mast("SECTION=CIRC\n0.2, 0.2\n1, 0, 0\n") + "*BOUNDARY\n1, ENCASTRE\n";
+  const std::string torn = input_error([&] { read(two); });
+  EXPECT_TRUE(says(torn, "signs of both") && says(torn, "ENCASTRE") && says(torn, "--dialect")) << torn;
+  EXPECT_NEAR(section_area(read(two, Dialect::calculix).mesh), pi * 0.01, 1e-14);
 }
 
 TEST(Abaqus, ElementsThatAreNotThoseOfThePrograms) {

@@ -1,12 +1,15 @@
 #include "fem/formats/mesh_formats.hpp"
 
+#include "fem/base/check.hpp"
 #include "fem/base/files.hpp"
 #include "fem/base/text_reader.hpp"
 #include "fem/formats/abaqus/write.hpp"
 #include "mesh_file_testing.hpp"
 
+#include <sys/resource.h>
 #include <sys/stat.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <tuple>
@@ -64,6 +67,45 @@ TEST(MeshFile, CutFilesAreErrors) {
           << name << " cut at " << size;
     }
   }
+}
+
+long peak_memory_kb() {
+  struct rusage usage {};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_maxrss;
+}
+
+// Whatever a small file announces: the error comes before the memory is taken.
+TEST(MeshFile, HugeNumbersInSmallMshFilesTakeLittleTimeAndMemory) {
+  const Folder folder;
+  const std::filesystem::path file = folder.path / "huge.msh";
+  const long before = peak_memory_kb();
+  const auto start = std::chrono::steady_clock::now();
+  int errors = 0;
+  const auto try_to_read = [&](const std::string& text) {
+    write_file(file, text);
+    try {
+      read_mesh(file);
+    } catch (const InputError&) {
+      ++errors;  // anything else fails the test
+    }
+  };
+  for (const char* name : {"wedge_2_v22.msh", "hex_2_v41.msh"}) {
+    const std::string text = file_bytes(test_mesh(name));
+    for (size_t begin = 0, end = 0; begin < text.size(); begin = end + 1) {
+      end = std::min(text.find_first_of(" \n", begin), text.size());
+      const std::string_view token = std::string_view(text).substr(begin, end - begin);
+      if (token.empty() || token.find_first_not_of("0123456789") != std::string_view::npos) continue;
+      for (const char* huge : {"2147483647", "9223372036854775807"})
+        try_to_read(std::string(text).replace(begin, token.size(), huge));
+    }
+  }
+  const std::string binary = file_bytes(test_mesh("tet_1_v22_binary.msh"));
+  for (size_t at = 0; at + 4 <= binary.size(); ++at)
+    try_to_read(std::string(binary).replace(at, 4, "\xFF\xFF\xFF\x7F"));
+  EXPECT_GT(errors, 500);
+  EXPECT_LT(peak_memory_kb() - before, 512 << 10);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::minutes(2));
 }
 
 TEST(MeshFile, GeometryIsMeshedByGmsh) {

@@ -4,7 +4,9 @@
 #include "mesh_file_testing.hpp"
 
 #include <fmt/format.h>
+#include <zlib.h>
 
+#include <cstdint>
 #include <cstdlib>
 
 namespace flexboom::testing {
@@ -199,6 +201,35 @@ TEST(Vtu, ConnectionsCannotBeHeld) {
   EXPECT_EQ(input_error([&] { write_mesh(folder.path / "x.vtu", mesh); }),
             "cannot write " + (folder.path / "x.vtu").string() +
                 ": a .vtu file cannot hold a rigid connection (node 2); write .inp");
+}
+
+// Zeros pack to a thousandth: a file of kilobytes could ask for gigabytes.
+TEST(Vtu, ZerosThatUnpackBeyondMeasureAreRefused) {
+  const std::uint64_t points = 3'200'000, size = points * 3 * sizeof(double);
+  const std::string zeros(size, '\0');
+  auto packed_size = ::compressBound(size);
+  std::string packed(packed_size, '\0');
+  ASSERT_EQ(::compress(reinterpret_cast<Bytef*>(packed.data()), &packed_size,
+                       reinterpret_cast<const Bytef*>(zeros.data()), size),
+            Z_OK);
+  packed.resize(packed_size);
+  std::string data;
+  for (const std::uint64_t number : {std::uint64_t{1}, size, std::uint64_t{0}, std::uint64_t{packed_size}})
+    data.append(reinterpret_cast<const char*>(&number), sizeof number);
+  const Folder folder;
+  write_file(folder.path / "bomb.vtu",
+             fmt::format("<VTKFile type=\"UnstructuredGrid\" header_type=\"UInt64\" "
+                         "compressor=\"vtkZLibDataCompressor\"><UnstructuredGrid>\n"
+                         "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"1\"><Points>\n"
+                         "<DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>"
+                         "</Points><Cells>\n"
+                         "<DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 3</DataArray>\n"
+                         "<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray>\n"
+                         "<DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">10</DataArray>\n"
+                         "</Cells></Piece></UnstructuredGrid><AppendedData encoding=\"raw\">_{}",
+                         points, data + packed));
+  const std::string message = input_error([&] { read_mesh(folder.path / "bomb.vtu"); });
+  EXPECT_NE(message.find("unpack to 76800000 bytes, more than 64 times the file"), std::string::npos) << message;
 }
 
 }  // namespace

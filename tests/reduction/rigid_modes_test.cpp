@@ -1,4 +1,5 @@
 #include "fem/base/check.hpp"
+#include "fem/base/files.hpp"
 #include "fem/booms/solid_boom.hpp"
 #include "fem/formats/mesh_formats.hpp"
 #include "reduction/basis/mean_axis.hpp"
@@ -7,11 +8,15 @@
 #include "tests/fem/solid_testing.hpp"
 #include "tests/reduction/booms.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <numbers>
+#include <string>
+#include <utility>
 
 namespace flexboom {
 namespace {
@@ -144,6 +149,58 @@ TEST(RigidModes, AMeshWithoutMassSaysSo) {
     EXPECT_NE(std::string(error.what()).find("nothing has mass"), std::string::npos) << error.what();
     EXPECT_NE(std::string(error.what()).find("\"M\""), std::string::npos) << error.what();
     EXPECT_NE(std::string(error.what()).find("--material E,nu,rho"), std::string::npos) << error.what();
+  }
+}
+
+/// A deck as a file of that extension.
+Mesh deck_of(const std::string& extension, const std::string& text) {
+  const std::filesystem::path file =
+      std::filesystem::path(::testing::TempDir()) / ("deck." + std::to_string(::getpid()) + extension);
+  write_file(file, text);
+  const Mesh mesh = read_mesh(file).mesh;
+  std::filesystem::remove(file);
+  return mesh;
+}
+
+const char* const nodes_of_four = "*NODE\n1\n2, 1\n3, 0, 1\n4, 0, 0, 1\n";
+const char* const weightless = "*MATERIAL, NAME=M\n*ELASTIC\n7e10, 0.3\n";
+
+TEST(RigidModes, ADeckWithoutDensitySaysSo) {
+  for (const auto& [extension, text] :
+       {std::pair{".inp", std::string(nodes_of_four) + "*ELEMENT, TYPE=C3D4, ELSET=E\n1, 1, 2, 3, 4\n" + weightless +
+                              "*SOLID SECTION, ELSET=E, MATERIAL=M\n"},
+        std::pair{".inp", std::string("*NODE\n1\n2, 1\n3, 2\n*ELEMENT, TYPE=B31, ELSET=E\n1, 1, 2\n2, 2, 3\n") +
+                              weightless + "*BEAM SECTION, ELSET=E, MATERIAL=M, SECTION=RECT\n0.1, 0.1\n0, 1, 0\n"},
+        std::pair{".bdf", std::string("GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n"
+                                      "CTETRA,1,1,1,2,3,4\nPSOLID,1,1\nMAT1,1,7.+10,,.3\n")}}) {
+    const Mesh mesh = deck_of(extension, text);
+    for (const Clamp& clamp : {Clamp(), Clamp({0})}) try {
+        clamped_modes(mesh, assemble(mesh), clamp, {.num_modes = 3, .sigma = {}});
+        ADD_FAILURE() << text;
+      } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("nothing has mass"), std::string::npos) << error.what() << text;
+      }
+  }
+}
+
+// Freedoms of it that hold no node of the face have neither stiffness nor mass.
+TEST(RigidModes, AReferenceNodeWithoutElementsHasNoModesOfItsOwn) {
+  const std::string cube =
+      "*NODE\n1\n2, 1\n3, 1, 1\n4, 0, 1\n5, 0, 0, 1\n6, 1, 0, 1\n7, 1, 1, 1\n8, 0, 1, 1\n"
+      "*ELEMENT, TYPE=C3D8I, ELSET=E\n1, 1, 2, 3, 4, 5, 6, 7, 8\n*MATERIAL, NAME=M\n*ELASTIC\n7e10, 0.3\n"
+      "*DENSITY\n2700\n*SOLID SECTION, ELSET=E, MATERIAL=M\n";
+  const std::string coupled = cube +
+                              "*NODE\n20, 0.5, 0.5, 3\n*SURFACE, NAME=Top\nE, S2\n"
+                              "*COUPLING, REF NODE=20, SURFACE=Top, CONSTRAINT NAME=C\n";
+  const Modes plain = modes(deck_of(".inp", cube), {}, 10);
+  EXPECT_EQ(plain.rigid, 6);
+  for (const char* freedoms : {"1, 1", "1, 3", "1, 6"}) {
+    const Modes distributing = modes(deck_of(".inp", fmt::format("{}*DISTRIBUTING\n{}\n", coupled, freedoms)), {}, 10);
+    EXPECT_EQ(distributing.rigid, 6) << freedoms;
+    EXPECT_LT((distributing.hz - plain.hz).tail(4).norm(), 1e-9 * plain.hz.norm()) << freedoms;
+    const Modes kinematic = modes(deck_of(".inp", fmt::format("{}*KINEMATIC\n{}\n", coupled, freedoms)), {}, 10);
+    EXPECT_EQ(kinematic.rigid, 6) << freedoms;
+    EXPECT_GT(kinematic.hz(6), plain.hz(6) * (1 - 1e-9)) << freedoms;  // a stiff face
   }
 }
 

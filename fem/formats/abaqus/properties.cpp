@@ -57,8 +57,9 @@ SectionShape round_bar(Deck& deck, const std::vector<double>& d, std::string_vie
         deck.dialect(at, "SECTION=CIRC with one number is a diameter in CalculiX and a radius in Abaqus");
     return RoundBar{dialect == Dialect::calculix ? d[0] : 2 * d[0]};
   }
-  if (deck.options.dialect == Dialect::abaqus) deck.fail(at, "SECTION=CIRC takes one number in Abaqus, the radius");
-  deck.notes.add("SECTION=CIRC with two numbers is read as CalculiX does: diameters, not radii");
+  if (deck.dialect(at, "SECTION=CIRC with two numbers has diameters in CalculiX and is no section of Abaqus") ==
+      Dialect::abaqus)
+    deck.fail(at, "SECTION=CIRC takes one number in Abaqus, the radius");
   if (d.size() != 2 || d[0] != d[1])
     deck.fail(at, "SECTION=CIRC needs two equal diameters (ellipses are not understood)");
   return RoundBar{d[0]};
