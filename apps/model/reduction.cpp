@@ -354,13 +354,13 @@ RicherBodies richer_bodies(Model& model, const ReductionOptions& options, const 
   RicherBodies r;
   if (errors == "none") return r;
   r.more_modes = with_more_modes(model, o, kept, threads);
-  if (!r.more_modes) model.notes.push_back("no more modes are kept for error estimates: the elements have no more");
+  if (!r.more_modes) model.notes.emplace_back("no more modes are kept for error estimates: the elements have no more");
   if (errors != "all") return r;
   try {
     r.finer_elements = with_finer_elements(model, o, threads);
     r.error_per_change = 1 / (1 - slowest_fall(model));
     if (!r.finer_elements)
-      model.notes.push_back("no finer elements are kept for error estimates: they would be too many");
+      model.notes.emplace_back("no finer elements are kept for error estimates: they would be too many");
   } catch (const InputError& e) {
     model.notes.push_back(fmt::format("no finer elements are kept for error estimates: {}", e.what()));
   }
