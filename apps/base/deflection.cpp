@@ -1,10 +1,11 @@
 #include "apps/base/deflection.hpp"
 
+#include "fem/base/text_reader.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <string_view>
 #include <vector>
@@ -20,11 +21,6 @@ namespace {
 
 constexpr double zero_shape = 1e-10;  // of shapes where the body is held
 
-bool says_tip(std::string_view name) {
-  constexpr std::string_view tip = "tip";
-  return std::ranges::equal(name, tip, {}, [](unsigned char c) { return std::tolower(c); });
-}
-
 /// Of a body without a picture: a rod of its mass and inertia.
 double length_of_rod(const ReducedBody& b) {
   const double J = b.J0.trace() - 2 * b.mc0.squaredNorm() / b.m;  // about the mass centre
@@ -37,7 +33,7 @@ const Marker* tip_of(const ReducedBody& body) {
   const Marker *named = nullptr, *only = nullptr;
   double most = 0;
   for (const Marker& m : body.markers) {
-    if (says_tip(m.name) && (!named || m.name == "tip")) named = &m;
+    if (same_but_case(m.name, "tip") && (!named || m.name == "tip")) named = &m;
     most = std::max(most, m.S.norm());
   }
   int moving = 0;

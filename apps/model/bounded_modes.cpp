@@ -19,10 +19,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double unresolved = 0.1;        // change of a frequency
-constexpr double round_off = 1e-12;       // of a frequency by any mesh
-constexpr int most_steps = 3;             // to finer meshes
-constexpr Index most_unknowns = 120'000;  // about a minute, and four gigabytes
+constexpr double unresolved = 0.1;   // change of a frequency
+constexpr double round_off = 1e-12;  // of a frequency by any mesh
+constexpr int most_steps = 3;        // to finer meshes
 
 bool is_solid(const Model& model) { return model.body && model.body->structure == "solid"; }
 
@@ -53,10 +52,10 @@ double seconds_of(const BoundedModes& m) { return m.mesh_seconds + m.assemble_se
 std::optional<BoundedModes> finer(const Model& model, int steps, const EigenOptions& options, int threads) {
   Stopwatch clock;
   try {
-    Model next = refined(model, steps);
-    if (next.mesh.nodes.size() > most_unknowns) return {};
+    std::optional<Model> next = refined_if_bearable(model, steps);
+    if (!next) return {};
     const double mesh_seconds = clock.seconds();
-    BoundedModes r = modes_of(std::move(next), options, threads);
+    BoundedModes r = modes_of(*std::move(next), options, threads);
     r.mesh_seconds = mesh_seconds;
     return r;
   } catch (const InputError&) {

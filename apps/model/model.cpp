@@ -85,6 +85,13 @@ Model refined(const Model& model, int steps) {
   return r;
 }
 
+std::optional<Model> refined_if_bearable(const Model& model, int steps) {
+  constexpr Eigen::Index most_unknowns = 120'000;  // of a solid: three per node
+  Model r = refined(model, steps);
+  if (r.mesh.nodes.size() > most_unknowns) return {};
+  return r;
+}
+
 Model load_model(const std::filesystem::path& path, const ModelOptions& options) {
   Model model = path.extension() == ".toml" ? body_model(path, options) : file_model(path, options);
   for (std::string& suspicion : suspicions(model.mesh)) model.notes.push_back(std::move(suspicion));

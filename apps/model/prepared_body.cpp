@@ -48,8 +48,9 @@ PreparedBody prepared(ReducedBody body) {
   return p;
 }
 
-PreparedBody prepare_reduced(const BodyScene& b) {
-  PreparedBody p = prepared(*b.reduced);
+PreparedBody prepare_reduced(const BodyScene& b, int refine) {
+  const bool finer = refine > 0 && b.richer && b.richer->finer_elements;
+  PreparedBody p = prepared(finer ? *b.richer->finer_elements : *b.reduced);
   p.body.name = b.name;
   if (b.damping.name != "none") apply_damping(p.body, b.damping);  // else the file's
   if (p.body.display.points.cols() == 0) p.body.display = box_of(p.body);
@@ -162,7 +163,7 @@ namespace {
 
 PreparedBody with_all_shapes(const BodyScene& b, int refine, const std::filesystem::path& keep) {
   if (b.rigid) return prepare_rigid(b);
-  if (b.reduced) return prepare_reduced(b);
+  if (b.reduced) return prepare_reduced(b, refine);
   require(b.structure == "eq14" || b.structure == "beam" || b.structure == "solid" || b.structure == "rigid",
           fmt::format("body {}: structure '{}' is not available; there are: 'beam', 'solid', 'eq14', 'rigid'", b.name,
                       b.structure));

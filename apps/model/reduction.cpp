@@ -2,7 +2,6 @@
 
 #include "apps/base/axis.hpp"
 #include "apps/base/version.hpp"
-#include "apps/model/bounded_modes.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 #include "fem/base/text_reader.hpp"
@@ -308,63 +307,6 @@ ReducedBody make_reduced_body(Model& model, const ReductionOptions& options, int
                      options_text(o)};
   body.validate();
   return body;
-}
-
-namespace {
-
-/// Without what a flight in comparison does not look at.
-ReducedBody for_comparison(Model model, const ReductionOptions& o, int threads) {
-  ReductionSeconds seconds;
-  ReducedBody body = make_reduced_body(model, o, threads, seconds);
-  body.display = {};
-  return body;
-}
-
-/// With as many more modes as the elements have, eight at most.
-std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions o, const ReducedBody& kept,
-                                           int threads) {
-  o.select.reset();
-  const int given = o.basis.modes;
-  for (int more = 8; more >= 0; more -= 2) {
-    o.basis.modes = given + (o.basis.in_plane ? more / 2 : more);
-    try {
-      ReducedBody body = for_comparison(model, o, threads);
-      if (body.n() > kept.n()) return body;
-      return {};
-    } catch (const InputError&) {  // it has not so many
-    }
-  }
-  return {};
-}
-
-/// One step finer. Empty: that is too large.
-std::optional<ReducedBody> with_finer_elements(const Model& model, const ReductionOptions& o, int threads) {
-  constexpr Eigen::Index most_nodes = 120'000;  // about a minute, and four gigabytes
-  const Model finer = refined(model, 1);
-  if (finer.mesh.nodes.size() > most_nodes) return {};
-  return for_comparison(finer, o, threads);
-}
-
-}  // namespace
-
-RicherBodies richer_bodies(Model& model, const ReductionOptions& options, const ReducedBody& kept,
-                           const std::string& errors, int threads) {
-  ReductionOptions o = options;
-  o.certified = false;
-  RicherBodies r;
-  if (errors == "none") return r;
-  r.more_modes = with_more_modes(model, o, kept, threads);
-  if (!r.more_modes) model.notes.emplace_back("no more modes are kept for error estimates: the elements have no more");
-  if (errors != "all") return r;
-  try {
-    r.finer_elements = with_finer_elements(model, o, threads);
-    r.error_per_change = 1 / (1 - slowest_fall(model));
-    if (!r.finer_elements)
-      model.notes.emplace_back("no finer elements are kept for error estimates: they would be too many");
-  } catch (const InputError& e) {
-    model.notes.push_back(fmt::format("no finer elements are kept for error estimates: {}", e.what()));
-  }
-  return r;
 }
 
 namespace {

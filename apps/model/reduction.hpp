@@ -3,7 +3,6 @@
 #include "apps/model/model.hpp"
 #include "reduction/basis/basis.hpp"
 #include "reduction/body/reduced_body.hpp"
-#include "reduction/body_file/body_file.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -53,7 +52,7 @@ struct ReduceArguments {
   std::optional<std::string> damping;  // "modal:0.005", "loss-factor:0.01", "rayleigh:ALPHA,BETA", "none"
   bool stiffening = true;
   std::vector<std::string> loads_at;  // node sets; empty: every marker that moves
-  std::string errors = "all";         // what the file keeps for error estimates: one of kept_for_errors
+  std::string errors = "all";         // what the file keeps for error estimates, of kept_for_errors
 };
 
 /// "all": a body with more modes and one of finer elements; "modes": the former.
@@ -66,11 +65,6 @@ ReductionOptions reduction_options(const ReduceArguments&, const Model&);
 /// notes grow by what the basis has to say. Adds the time of its stages to `seconds`.
 /// @throws InputError for a place that the model lacks, NumericalError as the bases.
 ReducedBody make_reduced_body(Model& model, const ReductionOptions&, int threads, ReductionSeconds& seconds);
-
-/// Bodies beside `kept`, which was made of a model by these options, that leave less out; pictures are left out of
-/// them. `errors`: one of kept_for_errors. `model` is as it was before; its notes say what there is not.
-RicherBodies richer_bodies(Model& model, const ReductionOptions&, const ReducedBody& kept, const std::string& errors,
-                           int threads);
 
 /// Mass, centre, inertia, coordinate table and checks of a body, as text.
 std::string description(const ReducedBody&, const std::vector<BodyCheck>& checks);

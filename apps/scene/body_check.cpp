@@ -4,6 +4,7 @@
 #include "apps/scene/scene_keys.hpp"
 #include "fem/assembly/constraints.hpp"
 #include "fem/base/check.hpp"
+#include "fem/base/text_reader.hpp"
 #include "reduction/basis/basis.hpp"
 #include "reduction/eigen/solver.hpp"
 
@@ -256,22 +257,18 @@ void check_stiffening(Faults& faults, const std::string& path, const BodyScene& 
                                              : R"(is "on", but structure "eq14" has none; use "beam", or "off")");
 }
 
-/// The set that a name up to `end` is, where it differs by case alone.
-void spell_set(std::string& text, size_t end, const std::vector<std::string_view>& sets) {
-  const std::string name = text.substr(0, end);
-  const auto like = [&name](std::string_view set) { return same_but_case(set, name); };
-  if (std::ranges::find(sets, name) != sets.end() || std::ranges::count_if(sets, like) != 1) return;
-  text.replace(0, name.size(), *std::ranges::find_if(sets, like));
-}
-
 }  // namespace
 
 void spell_sets(BodyScene& body) {
   const std::vector<std::string_view> sets = sets_of(body);
-  spell_set(body.clamp, std::string::npos, sets);
-  spell_set(body.basis.reference, std::string::npos, sets);
-  for (std::string& text : body.basis.interfaces) spell_set(text, text.find(':'), sets);
-  for (std::string& text : body.basis.corrections) spell_set(text, text.rfind('.'), sets);
+  const auto spell = [&sets](std::string& text, size_t end) {  // the name ends there, or with the text
+    const std::string name = text.substr(0, end);
+    text.replace(0, name.size(), spelled(name, sets));
+  };
+  spell(body.clamp, std::string::npos);
+  spell(body.basis.reference, std::string::npos);
+  for (std::string& text : body.basis.interfaces) spell(text, text.find(':'));
+  for (std::string& text : body.basis.corrections) spell(text, text.rfind('.'));
 }
 
 bool is_tapered(const BeamSegment& segment) {

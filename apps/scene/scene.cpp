@@ -4,13 +4,13 @@
 #include "apps/scene/keys.hpp"
 #include "apps/scene/scene_keys.hpp"
 #include "fem/base/check.hpp"
+#include "fem/base/text_reader.hpp"
 #include "reduction/body_file/body_file.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -92,11 +92,6 @@ void write_out_shorthand(Scene& scene) {
 
 }  // namespace
 
-bool same_but_case(std::string_view a, std::string_view b) {
-  return std::ranges::equal(
-      a, b, {}, [](unsigned char c) { return std::tolower(c); }, [](unsigned char c) { return std::tolower(c); });
-}
-
 void read_file_of_body(TableReader& entry, Reading& reading, BodyScene& body) {
   const auto fault = [&](const std::string& text) {
     reading.faults.add(entry.path(), entry.place("file"), "file: " + text);
@@ -117,10 +112,7 @@ void look_up(const Scene& scene, PlaceScene& place) {
   if (body == scene.bodies.end()) return;
   if (place.marker.empty() && place.point.isZero(0) && body->is_boom() && body->root_moves()) place.marker = "root";
   if (place.marker.empty()) return;
-  const std::vector<std::string> names = marker_names(*body);
-  if (std::ranges::find(names, place.marker) != names.end()) return;
-  const auto like = [&](const std::string& name) { return same_but_case(name, place.marker); };
-  if (std::ranges::count_if(names, like) == 1) place.marker = *std::ranges::find_if(names, like);
+  place.marker = spelled(place.marker, marker_names(*body));
 }
 
 Vector3d unit_direction(const Vector3d& v) {

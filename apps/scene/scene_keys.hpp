@@ -94,9 +94,6 @@ void look_up(const Scene&, PlaceScene&);
 /// The same of the node sets that a boom names.
 void spell_sets(BodyScene&);
 
-/// Are these names the same but for upper and lower case?
-bool same_but_case(std::string_view a, std::string_view b);
-
 /// What formulation = "multipliers" cannot do.
 void check_multipliers(const Scene&, toml_reader::Faults&);
 

@@ -17,18 +17,14 @@ using Richer = std::optional<ReducedBody> RicherBodies::*;
 
 bool has(const BodyScene& b, Richer richer) { return b.richer && ((*b.richer).*richer).has_value(); }
 
-/// Bodies from files by the richer ones that their files have.
-Scene with_richer(Scene scene, Richer richer) {
-  for (BodyScene& b : scene.bodies)
-    if (b.reduced && has(b, richer)) b.reduced = {b.richer, &*((*b.richer).*richer)};
-  return scene;
-}
-
 }  // namespace
 
 Scene with_more_modes(Scene scene, int times) {
-  scene = with_richer(std::move(scene), &RicherBodies::more_modes);
   for (BodyScene& b : scene.bodies) {
+    if (has(b, &RicherBodies::more_modes)) {
+      b.reduced = {b.richer, &*b.richer->more_modes};
+      b.richer = nullptr;  // of those modes there is nothing finer
+    }
     if (b.structure == "rigid" || !b.is_boom()) continue;
     b.modes = b.directions == "all" ? b.modes + 4 * times : 2 * (b.modes + 2 * times);
     b.directions = "all";
@@ -95,7 +91,7 @@ const BodyScene* any_without(const Scene& scene, Richer richer) {
 double error_per_change(const Scene& scene) {
   double r = 1;
   for (const BodyScene& b : scene.bodies)
-    if (b.reduced && has(b, &RicherBodies::finer_elements)) r = std::max(r, b.richer->error_per_change);
+    if (has(b, &RicherBodies::finer_elements)) r = std::max(r, b.richer->error_per_change);
   return r;
 }
 
@@ -308,9 +304,8 @@ ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, 
       budget.truncation = none(&OutputErrors::truncation);
   }
   if (!m.stopped() && !is_missing("discretisation", &RicherBodies::finer_elements, "finer elements")) {
-    const Scene fine = with_richer(flown, &RicherBodies::finer_elements);
     const auto finer = [&] {
-      return m.enter(&OutputErrors::discretisation, change(run, fine, 2, m), 0, error_per_change(scene));
+      return m.enter(&OutputErrors::discretisation, change(run, flown, 2, m), 0, error_per_change(scene));
     };
     if (any_elastic(scene, "beam") || any_elastic(scene, "solid"))
       budget.discretisation = m.measured("discretisation", finer);

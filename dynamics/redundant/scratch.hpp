@@ -2,6 +2,7 @@
 
 // Small helpers of the redundant coordinates' equations.
 
+#include "dynamics/model/load_values.hpp"
 #include "dynamics/redundant/equations.hpp"
 
 #include <array>
@@ -47,16 +48,7 @@ inline std::array<double, 4> half_product(const double* p, const Vec3<double>& w
           0.5 * (p[0] * w.y + p[3] * w.x - p[1] * w.z), 0.5 * (p[0] * w.z + p[1] * w.y - p[2] * w.x)};
 }
 
-struct ForceAndTorque {
-  Vec3<double> force, torque;
-};
-
 /// A load in inertial axes.
-inline ForceAndTorque load_in_own_axes(const Load& load, double t) {
-  const auto at = [t](const std::function<double(double)>& f) { return f ? f(t) : 0.0; };
-  return {{at(load.force[0]), at(load.force[1]), at(load.force[2])},
-          {at(load.torque[0]), at(load.torque[1]), at(load.torque[2])}};
-}
 inline ForceAndTorque load_at(const Load& load, const PlaceMotion<double>& m, double t) {
   const ForceAndTorque own = load_in_own_axes(load, t);
   if (load.inertial_axes) return own;

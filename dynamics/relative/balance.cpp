@@ -3,15 +3,11 @@
 #include "dynamics/relative/momenta.hpp"
 #include "fem/base/check.hpp"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <cmath>
 
 namespace flexboom {
 
-using Eigen::Matrix3d;
-using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 using spatial::eigen;
@@ -107,6 +103,12 @@ PlaceMotionInSpace in_space(const tree::Model& model, const Place& place, const 
   return m;
 }
 
+/// What the joint of a link exerts on place b, after the accelerations.
+JointLoad load_on_b(const tree::LinkScratch<double>& s) {
+  const tree::Twist<double> load = tree::joint_load(s);
+  return {eigen(load.t), eigen(load.w), {}};
+}
+
 }  // namespace
 
 PlaceMotionInSpace Tree::motion(double t, const Eigen::Ref<const VectorXd>& state, const Place& place) const {
@@ -132,9 +134,7 @@ std::vector<JointLoad> Tree::joint_loads(double t, const Eigen::Ref<const Vector
     const tree::Link& link = model.links[i];
     if (link.kind == JointKind::free) continue;
     const tree::LinkScratch<double>& s = scratch.links[i];
-    const tree::Twist<double> load = tree::joint_load(s);
-    JointLoad& out = loads[static_cast<size_t>(link.joint)];
-    out.force = eigen(load.t), out.torque = eigen(load.w);
+    JointLoad& out = loads[static_cast<size_t>(link.joint)] = load_on_b(s);
     for (int k = 0; link.prescribed && k < joint_type(link.kind).scalars; ++k)
       out.drive.push_back(tree::drive_load(link, k, state.data(), instant.drives[i], {},
                                            contact[static_cast<size_t>(link.joint)] != 0, s));
@@ -157,8 +157,7 @@ std::vector<StiffeningEffect> Tree::stiffening_effect(double t, const Eigen::Ref
     const auto in_brf = [&](const Vec3<double>& v) { return eigen(transposed_product(link.brf_axes, v)); };
     const Vec3<double> a = s.acceleration.t + cross(s.acceleration.w, o) + cross(s.w, cross(s.w, o));
     bodies.move(static_cast<size_t>(link.index), in_brf(s.w), in_brf(a), in_brf(s.acceleration.w));
-    const tree::Twist<double> load = tree::joint_load(s);
-    loads[static_cast<size_t>(link.joint)] = {eigen(load.t), eigen(load.w), {}};
+    loads[static_cast<size_t>(link.joint)] = load_on_b(s);
   }
   bodies.push_by_joints(loads);
   bodies.push_by_loads(t);

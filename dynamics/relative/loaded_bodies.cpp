@@ -1,5 +1,6 @@
 #include "dynamics/relative/loaded_bodies.hpp"
 
+#include "dynamics/model/load_values.hpp"
 #include "reduction/invariants/geometric_stiffness.hpp"
 
 #include <algorithm>
@@ -10,11 +11,6 @@ namespace flexboom {
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
-
-StiffeningEffect stiffening_effect(const ReducedBody& body, const MatrixXd& Kg) {
-  const auto [least, most] = relative_stiffness(body, Kg);
-  return {std::max(-least, most), std::max(-least, 0.0)};
-}
 
 LoadedBodies::LoadedBodies(const Multibody& scene, Where where) : scene_(scene), where_(std::move(where)) {
   for (const ReducedBody& body : scene.bodies) K_.emplace_back(MatrixXd::Zero(body.n(), body.n()));
@@ -51,14 +47,9 @@ void LoadedBodies::push_by_joints(const std::vector<JointLoad>& loads) {
 void LoadedBodies::push_by_loads(double t) {
   for (const Load& load : scene_.loads) {
     if (!counts(load.at)) continue;
-    Vector3d force = Vector3d::Zero(), torque = Vector3d::Zero();
-    for (size_t i = 0; i < 3; ++i) {
-      const auto axis = static_cast<Eigen::Index>(i);
-      if (load.force[i]) force[axis] = load.force[i](t);
-      if (load.torque[i]) torque[axis] = load.torque[i](t);
-    }
+    const ForceAndTorque own = load_in_own_axes(load, t);
     const Matrix3d axes = load.inertial_axes ? Matrix3d::Identity() : where_(load.at).axes;
-    push(load.at, axes * force, axes * torque);
+    push(load.at, axes * spatial::eigen(own.force), axes * spatial::eigen(own.torque));
   }
 }
 
@@ -79,7 +70,10 @@ void LoadedBodies::push_by_springs() {
 
 std::vector<StiffeningEffect> LoadedBodies::effects() const {
   std::vector<StiffeningEffect> effects;
-  for (size_t i = 0; i < K_.size(); ++i) effects.push_back(stiffening_effect(scene_.bodies[i], K_[i]));
+  for (size_t i = 0; i < K_.size(); ++i) {
+    const auto [least, most] = relative_stiffness(scene_.bodies[i], K_[i]);
+    effects.push_back({std::max(-least, most), std::max(-least, 0.0)});
+  }
   return effects;
 }
 

@@ -1,5 +1,6 @@
 #include "dynamics/relative/tree.hpp"
 
+#include "dynamics/model/load_values.hpp"
 #include "dynamics/numerics/inner_loop.hpp"
 #include "dynamics/relative/impl.hpp"
 #include "fem/base/check.hpp"
@@ -32,13 +33,14 @@ void set_instant(const Model& model, double t, Instant& instant) {
       instant.drives[i].acceleration[k] = functions[k].acceleration(t);
     }
   }
-  const auto value = [t](const std::function<double(double)>& f) { return f ? f(t) : 0.0; };
   for (size_t i = 0; i < model.loads.size(); ++i) {
-    const Load& load = model.scene->loads[i];
-    instant.loads[i] = {{value(load.force[0]), value(load.force[1]), value(load.force[2])},
-                        {value(load.torque[0]), value(load.torque[1]), value(load.torque[2])}};
+    const ForceAndTorque load = load_in_own_axes(model.scene->loads[i], t);
+    instant.loads[i] = {load.force, load.torque};
   }
-  for (size_t i = 0; i < model.wheels.size(); ++i) instant.wheels[i] = value(model.scene->wheels[i].torque);
+  for (size_t i = 0; i < model.wheels.size(); ++i) {
+    const std::function<double(double)>& torque = model.scene->wheels[i].torque;
+    instant.wheels[i] = torque ? torque(t) : 0.0;
+  }
 }
 
 Scratch<double> link_by_link(const Model& model, double t, const VectorXd& y, std::span<const char> contact,

@@ -70,14 +70,11 @@ struct Balance {
   double momentum_scale = 0, angular_momentum_scale = 0;  // sums over the bodies of the norms
 };
 
-/// Size of the geometric stiffness of a body against its Ke in some state.
+/// Size of the geometric stiffness of a body against its Ke in some state. 0 where the body has no Kg.
 struct StiffeningEffect {
   double size = 0;       // the largest |eigenvalue| of Kg(omega, a, alpha, joint forces) in the metric of Ke
   double softening = 0;  // what it takes from Ke: at 1 a shape has no stiffness left
 };
-
-/// 0 where the body has no Kg.
-StiffeningEffect stiffening_effect(const ReducedBody&, const Eigen::MatrixXd& Kg);
 
 /// What joint i exerts on its place b, axes of b; the opposite acts on a.
 struct JointLoad {

@@ -12,7 +12,6 @@ namespace flexboom {
 
 using Eigen::Index;
 using Eigen::Matrix3d;
-using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 using namespace redundant;

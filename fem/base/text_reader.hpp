@@ -2,6 +2,7 @@
 
 #include "fem/base/files.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +14,19 @@ std::string_view without_byte_order_mark(std::string_view);
 
 /// Text without blanks, tabs and carriage returns at its ends.
 std::string_view trimmed(std::string_view);
+
+/// Are these the same but for upper and lower case?
+bool same_but_case(std::string_view, std::string_view);
+
+/// A name as `known` spells it: itself, or where that is not known the only one that is the same but for case; else as
+/// it is.
+template <class Names>
+std::string spelled(std::string_view name, const Names& known) {
+  const auto like = [name](std::string_view other) { return same_but_case(other, name); };
+  const bool is_known = std::ranges::find(known, name) != std::ranges::end(known);
+  if (is_known || std::ranges::count_if(known, like) != 1) return std::string(name);
+  return std::string(*std::ranges::find_if(known, like));
+}
 
 /// A token as messages show it: in quotes, short, printable characters only.
 std::string quoted(std::string_view token);

@@ -2,6 +2,7 @@
 
 #include "fem/base/check.hpp"
 #include "fem/base/parallel.hpp"
+#include "fem/base/text_reader.hpp"
 #include "fem/mesh/element.hpp"
 #include "fem/mesh/mesh_sets.hpp"
 #include "fem/mesh/validation.hpp"
@@ -10,9 +11,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <numeric>
+#include <ranges>
 #include <set>
 
 namespace flexboom {
@@ -233,16 +234,7 @@ void Mesh::validate(int threads) const {
 }
 
 std::string node_set_name(const Mesh& mesh, const std::string& name) {
-  if (mesh.node_sets.contains(name)) return name;
-  const auto lower = [](unsigned char c) { return std::tolower(c); };
-  std::string found = name;
-  int count = 0;
-  for (const auto& [known, nodes] : mesh.node_sets) {
-    if (!std::ranges::equal(known, name, {}, lower, lower)) continue;
-    found = known;
-    ++count;
-  }
-  return count == 1 ? found : name;
+  return spelled(name, std::views::keys(mesh.node_sets));
 }
 
 const std::vector<int>& node_set(const Mesh& mesh, const std::string& name) {

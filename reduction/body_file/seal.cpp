@@ -25,7 +25,8 @@ void seal(std::string& bytes, int version) { bytes.replace(0, seal_size, seal_of
 int check_seal(std::string_view bytes) {
   require(!bytes.empty(), "the file is empty");
   require(!bytes.starts_with(hdf5_signature),
-          "an HDF5 file, but not a reduced body of flexboom, which begins with a line \"flexboom-body 1 sha256 ...\"");
+          "an HDF5 file, but not a reduced body of flexboom, which begins with a line \"flexboom-body VERSION sha256 "
+          "...\"");
   require(bytes.starts_with(format_word), "not a reduced body of flexboom (an HDF5 file of `flexboom reduce`)");
   const std::string_view text = bytes.substr(format_word.size(), seal_size);
   const std::string_view number = text.substr(0, text.find(' '));

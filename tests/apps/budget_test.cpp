@@ -99,25 +99,10 @@ TEST_P(Budget, NotAskedForIsNotMet) {
 
 // A stiff boom that rings undamped: the method by multipliers damps it far faster than asked, and says so.
 TEST(NoBudget, AnUnbalancedMotionIsWarnedOf) {
-  Scene scene = parse_scene(R"(format = "flexboom-scene-1"
-name = "ringing"
-duration = 0.2
-output_step = 0.01
-accuracy = { budget = false }
-[[bodies]]
-name = "boom"
-modes = 8
-stiffening = "on"
-segments = [{ shape = "round-bar", diameter = 0.01, length = 1.0, material = { E = 70e9, nu = 0.33, rho = 2700 } }]
-attachments = [{ name = "load", position = "tip", mass = 0.5 }]
-[[joints]]
-name = "hinge"
-kind = "hinge"
-b = { body = "boom", marker = "root" }
-stiffness = 50
-start = 0.05
-)",
-                            "ringing.toml");
+  Scene scene =
+      read_scene(std::filesystem::path(FLEXBOOM_TEST_DATA) / "verification" / "stiffened" / "ringing_boom.toml");
+  scene.duration = 0.2;
+  scene.error_budget = false;
   const auto is_warned_of = [](const RunResult& r) {
     return std::ranges::any_of(r.warnings, [](const std::string& w) { return w.starts_with("energy balance "); });
   };

@@ -101,6 +101,7 @@ Scene scene_that_may_stall(const std::string& name) {
 }
 
 const std::vector<std::string> scenes_that_may_stall = {"ringing_boom", "two_link_arm", "turned_panel"};
+
 TEST(StiffenedTrees, FlyPastWhereTheyMayStall) {
   for (const std::string& name : scenes_that_may_stall) {
     SCOPED_TRACE(name);

@@ -39,12 +39,6 @@ bool is_letter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool among(std::string_view name, const auto& list) { return std::ranges::count(list, name) > 0; }
 
-bool same_word(std::string_view word, std::string_view other) {
-  return std::ranges::equal(
-      word, other, {}, [](unsigned char c) { return std::tolower(c); },
-      [](unsigned char c) { return std::tolower(c); });
-}
-
 /// The words, strings and symbols of a script as gmsh sees them; comments are gone.
 std::vector<Token> tokens_of(const TextReader& reader) {
   const std::string_view text = reader.text();
@@ -124,13 +118,13 @@ void Inspection::command(const TextReader& reader, const std::vector<Token>& tok
   const bool has_argument = next_is(i + 1, Token::Kind::text) || next_is(i + 1, Token::Kind::word);
   for (const std::string_view name :
        {"SystemCall", "NonBlockingSystemCall", "OnelabRun", "ExternalProcess", "CommandLine"}) {
-    if (same_word(word, name)) refuse(reader, word, "starts a program");
+    if (same_but_case(word, name)) refuse(reader, word, "starts a program");
   }
-  if (same_word(word, "System") && has_argument) refuse(reader, word, "starts a program");
+  if (same_but_case(word, "System") && has_argument) refuse(reader, word, "starts a program");
   for (const std::string_view name : {"Save", "Print", "CreateDir", "CreateDirectory"}) {
-    if (same_word(word, name) && has_argument && !is_member) refuse(reader, word, "writes files");
+    if (same_but_case(word, name) && has_argument && !is_member) refuse(reader, word, "writes files");
   }
-  if (same_word(word, "Printf")) {  // up to the end of the statement; the strings are tokens of their own
+  if (same_but_case(word, "Printf")) {  // up to the end of the statement; the strings are tokens of their own
     for (size_t k = i + 1; k < tokens.size() && tokens[k].text != ";"; ++k) {
       if (tokens[k].kind == Token::Kind::symbol && tokens[k].text == ">") refuse(reader, word, "writes a file");
     }

@@ -1,0 +1,64 @@
+// Bodies of one model that leave less out than the one that is kept, for error estimates.
+
+#include "apps/model/richer_bodies.hpp"
+
+#include "apps/model/bounded_modes.hpp"
+#include "fem/base/check.hpp"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+namespace flexboom {
+namespace {
+
+/// Without what a flight in comparison does not look at.
+ReducedBody for_comparison(Model model, const ReductionOptions& o, int threads) {
+  ReductionSeconds seconds;
+  ReducedBody body = make_reduced_body(model, o, threads, seconds);
+  body.display = {};
+  return body;
+}
+
+/// With as many more modes as the elements have, eight at most.
+std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions o, const ReducedBody& kept,
+                                           int threads) {
+  o.select.reset();
+  const int given = o.basis.modes;
+  for (int more = 8; more >= 0; more -= 2) {
+    o.basis.modes = given + (o.basis.in_plane ? more / 2 : more);
+    try {
+      ReducedBody body = for_comparison(model, o, threads);
+      if (body.n() > kept.n()) return body;
+      return {};
+    } catch (const InputError&) {  // it has not so many
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+RicherBodies richer_bodies(const Model& model, const ReductionOptions& options, const ReducedBody& kept,
+                           const std::string& errors, int threads, std::vector<std::string>& notes) {
+  RicherBodies r;
+  if (errors == "none") return r;
+  ReductionOptions o = options;
+  o.certified = false;
+  r.more_modes = with_more_modes(model, o, kept, threads);
+  if (!r.more_modes) notes.emplace_back("no more modes are kept for error estimates: the elements have no more");
+  if (errors != "all") return r;
+  try {
+    if (const std::optional<Model> finer = refined_if_bearable(model, 1)) {
+      r.finer_elements = for_comparison(*finer, o, threads);
+      r.error_per_change = 1 / (1 - slowest_fall(model));
+    } else {
+      notes.emplace_back("no finer elements are kept for error estimates: they would be too many");
+    }
+  } catch (const InputError& e) {
+    notes.push_back(fmt::format("no finer elements are kept for error estimates: {}", e.what()));
+  }
+  return r;
+}
+
+}  // namespace flexboom
