@@ -13,8 +13,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <ranges>
 #include <set>
+#include <string_view>
 
 namespace flexboom {
 namespace {
@@ -234,7 +234,9 @@ void Mesh::validate(int threads) const {
 }
 
 std::string node_set_name(const Mesh& mesh, const std::string& name) {
-  return spelled(name, std::views::keys(mesh.node_sets));
+  std::vector<std::string_view> known;
+  for (const auto& [set, nodes] : mesh.node_sets) known.emplace_back(set);
+  return spelled(name, known);
 }
 
 const std::vector<int>& node_set(const Mesh& mesh, const std::string& name) {
