@@ -72,7 +72,7 @@ bool Contacts::update(StopMotion& motion, double t, std::vector<StopEvent>& even
         events.push_back({t, static_cast<int>(stops_[i].joint), closed_[i] != 0, gap.rate});
         chatter_.contact(t, stops_[i].name);
         approach_[i].restart(gap.rate);
-        if (std::abs(gap.rate) * stops_[i].period < small(i, motion) && !is_pushed(i, motion)) settle(i, t);
+        if (approach_[i].of_two_sides() * stops_[i].period < small(i, motion) && !is_pushed(i, motion)) settle(i, t);
       }
     } else if (!armed_[i] && std::max(std::abs(gap.rate) * stops_[i].period, gap.value) >
                                  2 * std::max(small(i, motion), asleep_[i])) {

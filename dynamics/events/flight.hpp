@@ -4,6 +4,7 @@
 #include "fem/base/stopwatch.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstddef>
@@ -41,9 +42,9 @@ struct FlightOptions {
   double start = 0;           // [s]
   double duration = 10;       // [s], the time at the end
   double output_step = 0.01;  // [s]
-  /// A hinge whose rate at the stop falls below this fraction of its largest rate so far has settled: its crossings are
-  /// no longer located (its stop counts as open) until the rate doubles. Zero: never. Negative: a hundredth of the
-  /// tolerance, no less than the tolerance or 1e-10.
+  /// A hinge whose rate on both sides of its stop stays below this fraction of its largest rate so far has settled: its
+  /// crossings are no longer located (its stop counts as open) until the rate doubles. Zero: never. Negative: a
+  /// hundredth of the tolerance, no less than the tolerance or 1e-10.
   double settle = -1;
   /// Per joint: of a flight that this one goes on. Empty: none was met.
   std::vector<StopHistory> stops{};
@@ -88,12 +89,18 @@ class Approach {
   void observe(double gap, double rate, double spring) {
     largest_ = std::max({largest_, std::abs(rate), std::abs(gap) * spring});
   }
-  void restart(double rate) { largest_ = std::abs(rate); }
+  void restart(double rate) {
+    before_[0] = before_[1], before_[1] = largest_;
+    largest_ = std::abs(rate);
+  }
   bool has_decayed(double rate) const { return std::abs(rate) < 1e-3 * largest_; }
+  /// The largest on the two sides of the stop before the last crossing, and since.
+  double of_two_sides() const { return std::max({before_[0], before_[1], largest_}); }
   double round_off() const { return 1e-14 * largest_; }
 
  private:
-  double largest_ = 0;  // [rad/s] or [m/s]
+  double largest_ = 0;                             // [rad/s] or [m/s]
+  std::array<double, 2> before_ = {1e300, 1e300};  // on the sides before that, older first; unknown at the start
 };
 
 /// Contacts that follow each other without time passing: a flight that no longer goes on.

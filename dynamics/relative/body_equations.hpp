@@ -244,15 +244,20 @@ void solve_hub(const HubSystem<T>& h, Vec3<T>& a, Vec3<T>& alpha) {
                {c.row[0].z, c.row[1].z, c.row[2].z, h.ww.zx, h.ww.yz, h.ww.zz}};
   T x[6] = {h.ft.x, h.ft.y, h.ft.z, h.fw.x, h.fw.y, h.fw.z};
   T inverse[6];
+#pragma GCC unroll 6
   for (int j = 0; j < 6; ++j) {  // LDL^T: M[i][j] holds L D until column j is done
     inverse[j] = T(1.0) / M[j][j];
+#pragma GCC unroll 6
     for (int i = j + 1; i < 6; ++i) {
       const T l = M[i][j] * inverse[j];
+#pragma GCC unroll 6
       for (int k = j + 1; k <= i; ++k) M[i][k] -= l * M[k][j];
       x[i] -= l * x[j];
     }
   }
+#pragma GCC unroll 6
   for (int j = 5; j >= 0; --j) {
+#pragma GCC unroll 6
     for (int i = j + 1; i < 6; ++i) x[j] -= M[i][j] * x[i];
     x[j] = x[j] * inverse[j];
   }

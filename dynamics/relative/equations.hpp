@@ -33,7 +33,7 @@ void condense_held(const Link& link, LinkScratch<T>& s) {
       s.v[k] += dot(U.t, W.ft) + dot(U.w, W.fw);
     }
     const T one(1.0), zero(0.0);
-    add_shifted(Mat3<T>{{Vec3<T>{one, zero, zero}, Vec3<T>{zero, one, zero}, Vec3<T>{zero, zero, one}}}, r, W, I);
+    I += shifted(Mat3<T>{{Vec3<T>{one, zero, zero}, Vec3<T>{zero, one, zero}, Vec3<T>{zero, zero, one}}}, r, W);
   }
   const Vec3<T>& r = s.b.r;
   s.beta.w = s.b.angular_acceleration(s.w);
@@ -69,9 +69,7 @@ void condense_held(const Link& link, LinkScratch<T>& s) {
   const Mat3<T>& E = s.b.turn;
   const Mat3<T> back = {{Vec3<T>{E.row[0].x, E.row[1].x, E.row[2].x}, Vec3<T>{E.row[0].y, E.row[1].y, E.row[2].y},
                          Vec3<T>{E.row[0].z, E.row[1].z, E.row[2].z}}};
-  HubSystem<T> at_b{};
-  add_shifted(back, -(back * r), I, at_b);
-  I = at_b;
+  I = shifted(back, -(back * r), I);
 }
 
 /// Articulated inertia of the link at its place b.
@@ -224,11 +222,11 @@ void hand_to_parent(const Link& link, LinkScratch<T>& s, LinkScratch<T>& parent)
   I.ft -= f.t;
   I.fw -= f.w;
   if (link.hung_on_moving_place)
-    add_shifted(s.A, s.lever, I, parent.hung[static_cast<size_t>(link.slot)]);
+    parent.hung[static_cast<size_t>(link.slot)] += shifted(s.A, s.lever, I);
   else if (link.kind == JointKind::slider)
-    add_shifted(s.A, s.arm, I, parent.I);
+    parent.I += shifted(s.A, s.arm, I);
   else
-    add_shifted(s.A, link.a.position, I, parent.I);
+    parent.I += shifted(s.A, link.a.position, I);
 }
 
 /// Accelerations of the modes from that of the body's origin, where place b does not move.
@@ -347,12 +345,10 @@ inline void condense_leaves(const Leaves& leaves, const Model& model, std::span<
     eliminate_freedom(Freedom::turn_z, 0, equations::hinge_torque(b, scratch.gap, scratch.rate, closed), s);
   }
   if (leaves.parent < 0) return;
-  HubSystem<Quad> I = s.I, at_parent{};
-  const Twist<Quad> f = I * s.bias;
-  I.ft -= f.t;
-  I.fw -= f.w;
-  add_shifted(s.A, leaves.position, I, at_parent);
-  links[static_cast<size_t>(leaves.parent)].I += sum(at_parent, leaves.count);
+  const Twist<Quad> f = s.I * s.bias;
+  s.I.ft -= f.t;
+  s.I.fw -= f.w;
+  links[static_cast<size_t>(leaves.parent)].I += sum(shifted(s.A, leaves.position, s.I), leaves.count);
 }
 
 /// Leaves after their parent: their accelerations.

@@ -30,31 +30,27 @@ void subtract_outer(HubSystem<T>& I, const Twist<T>& a, const Twist<T>& b) {
   equations::subtract_product(I.tw, a.t, b.w);
 }
 
-/// `to` += the inertia and force of I, in other axes (A: of I -> of `to`) and about another origin (arm: from there to
-/// that of I).
+/// The inertia and force of I in other axes (A: of I -> those) and about another origin (arm: from there to that of I).
 template <class T, class R>
-void add_shifted(const Mat3<T>& A, const R& arm, const HubSystem<T>& I, HubSystem<T>& to) {
-  const Sym3<T> TT = equations::rotate(A, I.tt);
+HubSystem<T> shifted(const Mat3<T>& A, const R& arm, const HubSystem<T>& I) {
+  HubSystem<T> r;
+  const Sym3<T>& TT = r.tt = equations::rotate(A, I.tt);
   const Mat3<T> TW = equations::rotate(A, I.tw);
-  const Vec3<T> FT = A * I.ft;
-  to.tt += TT;
-  to.ft += FT;
-  to.fw += A * I.fw + cross(arm, FT);
+  r.ft = A * I.ft;
+  r.fw = A * I.fw + cross(arm, r.ft);
   const Mat3<T> full = {{Vec3<T>{TT.xx, TT.xy, TT.zx}, Vec3<T>{TT.xy, TT.yy, TT.yz}, Vec3<T>{TT.zx, TT.yz, TT.zz}}};
-  Mat3<T> shifted = TW;  // tw - tt arm~
-  for (size_t i = 0; i < 3; ++i) {
-    shifted.row[i] -= cross(full.row[i], arm);
-    to.tw.row[i] += shifted.row[i];
-  }
+  r.tw = TW;  // tw - tt arm~
+  for (size_t i = 0; i < 3; ++i) r.tw.row[i] -= cross(full.row[i], arm);
   // ww + arm~ tw' + (arm~ tw)^T
   const auto left = [&arm](const Mat3<T>& X) {
     return Mat3<T>{{arm.y * X.row[2] - arm.z * X.row[1], arm.z * X.row[0] - arm.x * X.row[2],
                     arm.x * X.row[1] - arm.y * X.row[0]}};
   };
-  const Mat3<T> a = left(shifted), b = left(TW);
-  to.ww += equations::rotate(A, I.ww);
-  to.ww += Sym3<T>{a.row[0].x + b.row[0].x, a.row[1].y + b.row[1].y, a.row[2].z + b.row[2].z,
-                   a.row[0].y + b.row[1].x, a.row[1].z + b.row[2].y, a.row[2].x + b.row[0].z};
+  const Mat3<T> a = left(r.tw), b = left(TW);
+  r.ww = equations::rotate(A, I.ww);
+  r.ww += Sym3<T>{a.row[0].x + b.row[0].x, a.row[1].y + b.row[1].y, a.row[2].z + b.row[2].z,
+                  a.row[0].y + b.row[1].x, a.row[1].z + b.row[2].y, a.row[2].x + b.row[0].z};
+  return r;
 }
 
 /// Q, Q_dot, Q_ddot and the slopes of a body with second-order displacements.
