@@ -50,8 +50,8 @@ void Followers::start(double t, const VectorXd& y) {
   for (size_t i = 0; i < falls_.size(); ++i) {
     const FloatingBodies all = problem_.floating(i, t, y.data());
     Falling& fall = falls_[i];
-    fall.com = y.segment<3>(layout_.roots[i].position) + all.mass_centre;
-    fall.velocity = y.segment<3>(layout_.roots[i].velocity) + all.velocity;
+    fall.com = y.segment<3>(layout_.roots[i].position) + all.centre.position;
+    fall.velocity = y.segment<3>(layout_.roots[i].velocity) + all.centre.velocity;
     fall.coefficients.setZero();
     if (i == 0 && !started_) angular_momentum_ = all.angular_momentum;
   }
@@ -128,10 +128,10 @@ void Followers::turn(const CollocatedStep& step, const GridPoint& at, double c, 
 void Followers::place(const CollocatedStep& step, double c, Ref<VectorXd> y) {
   const double h = step.length;
   for (size_t i = 0; i < falls_.size(); ++i) {
-    const FloatingBodies all = problem_.floating(i, step.start + c * h, y.data());
+    const MassCentre centre = problem_.mass_centre(i, step.start + c * h, y.data());
     const Falling& fall = falls_[i];
-    y.segment<3>(layout_.roots[i].velocity) = fall.velocity + fall.speed(h, c) - all.velocity;
-    y.segment<3>(layout_.roots[i].position) = fall.com + h * c * fall.velocity + fall.way(h, c) - all.mass_centre;
+    y.segment<3>(layout_.roots[i].velocity) = fall.velocity + fall.speed(h, c) - centre.velocity;
+    y.segment<3>(layout_.roots[i].position) = fall.com + h * c * fall.velocity + fall.way(h, c) - centre.position;
   }
 }
 

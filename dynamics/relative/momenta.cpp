@@ -86,19 +86,56 @@ void add(const Model& model, size_t i, const double* y, const Reference& referen
     add(b, b.Ct, b.Me, b.diagonal, s, q, q_dot, reference, 1, to);
 }
 
+/// Adds one body, or `count` side by side, by its shapes Q, after poses.
+template <class C>
+void add_mass(const equations::BodyOf<C>& b, const LinkScratch<C>& s, const C* Q, const C* Q_dot,
+              const Reference& reference, int count, MassMotion& to) {
+  Vec3<C> mc = b.mc0, slid{};
+  for (size_t k = 0; k < b.Ct.size(); ++k) mc += Q[k] * b.Ct[k], slid += Q_dot[k] * b.Ct[k];
+  to.m += together(b.m, count);
+  to.first_moment += together(b.m * (s.R0 - equations::lift<C>(reference.position)) + s.A0 * mc, count);
+  to.momentum +=
+      together(b.m * (s.v0 - equations::lift<C>(reference.velocity)) + s.A0 * (cross(s.w, mc) + slid), count);
+}
+
 }  // namespace
 
 FLEXBOOM_INNER_LOOP
+MassMotion mass_motion(const Model& model, const double* y, const Instant& instant, const Reference& reference,
+                       Scratch<double>& scratch, HungOn bodies) {
+  move_links(model, y, instant, true, scratch);
+  MassMotion r;
+  for (const size_t i : scratch.singles) {
+    if (!bodies.counts(i)) continue;
+    const Link& link = model.links[i];
+    LinkScratch<double>& s = scratch.links[i];
+    const double *q = y + link.q, *q_dot = y + link.q_dot;
+    if (link.second_order) {
+      follow_coordinates(link, q, q_dot, s.second_order);
+      add_mass(link.shapes, s, s.second_order.Q.data(), s.second_order.Q_dot.data(), reference, 1, r);
+    } else {
+      add_mass(link.body, s, q, q_dot, reference, 1, r);
+    }
+  }
+  for (size_t i = 0; i < scratch.leaves.size(); ++i) {
+    const Leaves& leaves = model.leaves[i];
+    if (!bodies.counts(static_cast<size_t>(leaves.link[0]))) continue;
+    const LeavesScratch& s = scratch.leaves[i];
+    add_mass(leaves.body, s.link, s.q.data(), s.q_dot.data(), reference, leaves.count, r);
+  }
+  return r;
+}
+
+FLEXBOOM_INNER_LOOP
 Totals totals(const Model& model, const double* y, const Instant& instant, const Reference& reference,
-              Scratch<double>& scratch, std::span<const int> root_of, int root) {
-  const auto counts = [&](size_t link) { return root_of.empty() || root_of[link] == root; };
+              Scratch<double>& scratch, HungOn bodies) {
   move_links(model, y, instant, true, scratch);
   Totals r;
   for (const size_t i : scratch.singles)
-    if (counts(i)) add(model, i, y, reference, scratch.links[i], r);
+    if (bodies.counts(i)) add(model, i, y, reference, scratch.links[i], r);
   for (size_t i = 0; i < scratch.leaves.size(); ++i) {
     const Leaves& leaves = model.leaves[i];
-    if (!counts(static_cast<size_t>(leaves.link[0]))) continue;
+    if (!bodies.counts(static_cast<size_t>(leaves.link[0]))) continue;
     LeavesScratch& s = scratch.leaves[i];
     const equations::BodyOf<Quad>& b = leaves.body;
     s.link.I = {};
@@ -107,7 +144,7 @@ Totals totals(const Model& model, const double* y, const Instant& instant, const
   }
   for (size_t i = 0; i < model.wheels.size(); ++i) {  // rotors have no mass of their own
     const auto link = static_cast<size_t>(model.wheels[i].link);
-    if (!counts(link)) continue;
+    if (!bodies.counts(link)) continue;
     const LinkScratch<double>& s = scratch.links[link];
     const Vec3<double>& axis = model.wheels[i].at.position;
     const double J = model.scene->wheels[i].inertia, spin = y[model.spin + static_cast<int>(i)] + dot(axis, s.w);

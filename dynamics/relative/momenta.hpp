@@ -15,21 +15,34 @@ struct Reference {
 };
 
 /// Sums over bodies, inertial axes: about the reference point as though that were at rest.
-struct Totals {
+struct MassMotion {
   double m = 0;
-  Vec3<double> first_moment, momentum, angular_momentum;
+  Vec3<double> first_moment, momentum;
+
+  Vec3<double> mass_centre() const { return (1 / m) * first_moment; }
+};
+
+struct Totals : MassMotion {
+  Vec3<double> angular_momentum;
   Sym3<double> inertia;
   double kinetic = 0, strain = 0;  // strain: of the shapes
   // Sums over the bodies of |momentum| in inertial space, and of |angular momentum| about each one's own origin.
   double momentum_scale = 0, angular_momentum_scale = 0;
 
-  Vec3<double> mass_centre() const { return (1 / m) * first_moment; }
   Vec3<double> angular_momentum_about_mass_centre() const { return angular_momentum - cross(mass_centre(), momentum); }
 };
 
-/// Of the bodies whose entry of `root_of`, one per link, is `root`; of all where it is empty. Moves all links, poses
-/// included. `reference`: by its position and velocity in y, or what else is near the bodies.
-Totals totals(const Model&, const double* y, const Instant&, const Reference&, Scratch<double>&,
-              std::span<const int> root_of = {}, int root = 0);
+/// The bodies whose entry of `root_of`, one per link, is `root`; all where it is empty.
+struct HungOn {
+  std::span<const int> root_of{};
+  int root = 0;
+
+  bool counts(size_t link) const { return root_of.empty() || root_of[link] == root; }
+};
+
+/// Both move all links, poses included. `reference`: by its position and velocity in y, or what else is near the
+/// bodies.
+Totals totals(const Model&, const double* y, const Instant&, const Reference&, Scratch<double>&, HungOn = {});
+MassMotion mass_motion(const Model&, const double* y, const Instant&, const Reference&, Scratch<double>&, HungOn = {});
 
 }  // namespace flexboom::tree

@@ -37,10 +37,15 @@ struct SplitLayout {
   bool momentum_is_kept = false;  // of all bodies, the first root among them
 };
 
+/// Of all that hangs on a root, in the axes of the root's position.
+struct MassCentre {
+  Eigen::Vector3d position;  // from that of the root [m]
+  Eigen::Vector3d velocity;  // less that of the root [m/s]
+};
+
 /// All that hangs on a root, in the axes of its position.
 struct FloatingBodies {
-  Eigen::Vector3d mass_centre;       // from the root's position [m]
-  Eigen::Vector3d velocity;          // of the mass centre, less the root's [m/s]
+  MassCentre centre;
   Eigen::Matrix3d inertia;           // about the mass centre [kg m^2]
   Eigen::Vector3d angular_momentum;  // about the mass centre [N m s]
 };
@@ -59,6 +64,8 @@ class SplitProblem {
   virtual Eigen::MatrixXd linear(double t, const double* y, std::span<const char> contact, int first, int count) = 0;
   /// By x and attitudes alone. t: of prescribed motions [s].
   virtual FloatingBodies floating(size_t root, double t, const double* y) = 0;
+  /// The same mass centre, at a part of the cost.
+  virtual MassCentre mass_centre(size_t root, double t, const double* y) = 0;
 };
 
 std::unique_ptr<SplitProblem> split(const Tree&);

@@ -105,20 +105,35 @@ class SplitTree final : public SplitProblem {
   }
 
   FloatingBodies floating(size_t root, double t, const double* y) override {
+    put_roots_at_rest(t, y);
+    const tree::Totals all = tree::totals(model_, y_.data(), work_->instant, origin(root), work_->scratch, of(root));
+    const Matrix3d A = to_root(root), J = eigen(all.inertia) - mass_at(eigen(all.mass_centre()), all.m);
+    return {centre_of(all, A), A * J * A.transpose(), A * eigen(all.angular_momentum_about_mass_centre())};
+  }
+
+  MassCentre mass_centre(size_t root, double t, const double* y) override {
+    put_roots_at_rest(t, y);
+    return centre_of(tree::mass_motion(model_, y_.data(), work_->instant, origin(root), work_->scratch, of(root)),
+                     to_root(root));
+  }
+
+ private:
+  /// Takes y, less places and velocities of the roots.
+  void put_roots_at_rest(double t, const double* y) {
     y_ = Eigen::Map<const VectorXd>(y, layout_.size);
     for (const SplitLayout::Root& r : layout_.roots)
       y_.segment<3>(r.position).setZero(), y_.segment<3>(r.velocity).setZero();
     tree::set_instant(model_, t, work_->instant);
-    const tree::Reference origin = {root_links_[root]->a.position, {}};
-    const tree::Totals all =
-        tree::totals(model_, y_.data(), work_->instant, origin, work_->scratch, root_of_, static_cast<int>(root));
-    const Vector3d c = eigen(all.mass_centre());
-    const Matrix3d A = to_root(root), J = eigen(all.inertia) - mass_at(c, all.m);
-    return {A * c, A * eigen(all.momentum) / all.m, A * J * A.transpose(),
-            A * eigen(all.angular_momentum_about_mass_centre())};
   }
 
- private:
+  tree::Reference origin(size_t root) const { return {root_links_[root]->a.position, {}}; }
+  tree::HungOn of(size_t root) const { return {root_of_, static_cast<int>(root)}; }
+
+  /// A: inertial axes -> those of the root's position.
+  static MassCentre centre_of(const tree::MassMotion& all, const Matrix3d& A) {
+    return {A * eigen(all.mass_centre()), A * eigen(all.momentum) / all.m};
+  }
+
   /// The inertia of a mass at r.
   static Matrix3d mass_at(const Vector3d& r, double m) {
     return m * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose());

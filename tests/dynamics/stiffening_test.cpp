@@ -213,6 +213,7 @@ TEST(Stiffening, KeepsEnergyAndMomentum) {
   const std::vector<char> open(3, 0);
   tree.derivative(0, y.data(), open, *tree.workspace(), y_dot.data());
   const double h = 1e-6;
+  testing::expect_same_mass_centre(tree, y);
   const Balance plus = tree.balance(0, y + h * y_dot), minus = tree.balance(0, y - h * y_dot);
   // Energies near 1e2 J, difference over 2e-6: round-off 1e-8.
   EXPECT_NEAR((plus.energy() - minus.energy()) / (2 * h), 0, 3e-7);

@@ -1,8 +1,9 @@
 #pragma once
 
-#include "dynamics/relative/tree.hpp"
+#include "dynamics/relative/split.hpp"
 #include "dynamics_testing.hpp"
 
+#include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
 #include <cmath>
@@ -38,6 +39,14 @@ inline TimeFunction swing(double size) {
   return {[size](double t) { return size * std::sin(1.3 * t + 0.4); },
           [size](double t) { return 1.3 * size * std::cos(1.3 * t + 0.4); },
           [size](double t) { return -1.69 * size * std::sin(1.3 * t + 0.4); }};
+}
+
+/// Is the mass centre by itself that of all that floats?
+inline void expect_same_mass_centre(const Tree& tree, const Eigen::VectorXd& y) {
+  const auto problem = split(tree);
+  const MassCentre centre = problem->mass_centre(0, 0, y.data()), of_all = problem->floating(0, 0, y.data()).centre;
+  EXPECT_LT((centre.position - of_all.position).norm(), 1e-13 * (1 + of_all.position.norm()));
+  EXPECT_LT((centre.velocity - of_all.velocity).norm(), 1e-13 * (1 + of_all.velocity.norm()));
 }
 
 /// Random joint states, small random deflections, everything moving.
