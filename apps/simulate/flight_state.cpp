@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <set>
@@ -28,7 +29,7 @@ using toml_writer::toml;
 
 namespace {
 
-constexpr std::string_view state_format = "flexboom-state-4";
+constexpr std::string_view state_format = "flexboom-state-5";
 constexpr std::string_view checksum_key = "sha256";
 
 /// The line that holds the checksum of all others, or an empty one behind the end.
@@ -130,6 +131,9 @@ std::string to_toml(const FlightState& state, const std::string& scene) {
   for (const auto& [name, stop] : state.stops) out.key(toml(name), stop.largest_rate);
   out.table("[stops.largest_gap]");
   for (const auto& [name, stop] : state.stops) out.key(toml(name), stop.largest_gap);
+  out.table("[stops.sides]");
+  for (const auto& [name, stop] : state.stops)
+    out.key(toml(name), std::vector<double>(stop.sides.begin(), stop.sides.end()));
   out.table("[stops.closed]");
   for (const auto& [name, stop] : state.stops)
     if (stop.closed) out.key(toml(name), *stop.closed);
@@ -164,6 +168,17 @@ double finite(TableReader& table, const std::string& name) {
   const double value = table.number(name);
   if (!std::isfinite(value)) table.fault(name, "must be a finite number");
   return value;
+}
+
+/// Of StopHistory.
+std::array<double, 3> read_sides(TableReader& table, const std::string& name) {
+  std::array<double, 3> sides{};
+  const std::vector<double> values = table.numbers(name);
+  if (values.size() == sides.size() && std::ranges::all_of(values, [](double v) { return v >= 0 && std::isfinite(v); }))
+    std::ranges::copy(values, sides.begin());
+  else
+    table.fault(name, "must be three rates, none negative");
+  return sides;
 }
 
 /// All numbers of a table, by name.
@@ -255,6 +270,8 @@ SavedState SavedState::read(const fs::path& path, bool changed_too) {
   if (std::optional<TableReader> stops = table.table("stops", true)) {
     for (const auto& [name, rate] : numbers_of(*stops, "largest_rate")) content->stops[name].largest_rate = rate;
     for (const auto& [name, gap] : numbers_of(*stops, "largest_gap")) content->stops[name].largest_gap = gap;
+    if (std::optional<TableReader> sides = stops->table("sides"))
+      for (const auto& [name, value] : sides->value().entries) content->stops[name].sides = read_sides(*sides, name);
     if (std::optional<TableReader> closed = stops->table("closed"))
       for (const auto& [name, value] : closed->value().entries) content->stops[name].closed = closed->boolean(name);
     if (std::optional<TableReader> laws = stops->table("law"))

@@ -37,7 +37,10 @@ Contacts::Contacts(std::vector<Stop> stops, const FlightOptions& options, std::s
       crossed_(stops_.size(), 0),
       approach_(stops_.size()),
       asleep_(stops_.size(), 0.0) {
-  for (std::size_t i = 0; i < size(); ++i) armed_[i] = stops_[i].is_there && history_[stops_[i].joint].settled < 0;
+  for (std::size_t i = 0; i < size(); ++i) {
+    armed_[i] = stops_[i].is_there && history_[stops_[i].joint].settled < 0;
+    approach_[i] = Approach(history_[stops_[i].joint].sides);
+  }
 }
 
 void Contacts::begin(StopMotion& motion) {
@@ -86,7 +89,10 @@ bool Contacts::update(StopMotion& motion, double t, std::vector<StopEvent>& even
 
 std::vector<StopHistory> Contacts::histories() const {
   std::vector<StopHistory> all = history_;
-  for (std::size_t i = 0; i < size(); ++i) all[stops_[i].joint].closed = closed_[i] != 0;
+  for (std::size_t i = 0; i < size(); ++i) {
+    all[stops_[i].joint].closed = closed_[i] != 0;
+    all[stops_[i].joint].sides = approach_[i].sides();
+  }
   return all;
 }
 

@@ -18,8 +18,10 @@ namespace flexboom {
 
 /// How a stop was met so far: what settling is judged by, and what a flight that goes on must know.
 struct StopHistory {
-  double largest_rate = 0;        // of its hinge or joint [rad/s] or [m/s]
-  double largest_gap = 0;         // to either side of the stop [rad] or [m]
+  double largest_rate = 0;  // of its hinge or joint [rad/s] or [m/s]
+  double largest_gap = 0;   // to either side of the stop [rad] or [m]
+  /// On the two sides before the last crossing and since, older first, as Approach sees them [rad/s] or [m/s].
+  std::array<double, 3> sides{};
   double settled = -1;            // time after which it was no longer looked at [s], or -1
   std::optional<bool> closed{};   // at the end; unknown: as gap and rate are
   std::optional<LawState> law{};  // at the end; unknown: as the joint is and moves
@@ -85,22 +87,22 @@ class CheckpointClock {
 /// decays loses all of it: what it crosses the stop with is round-off or the method's error, and no contact.
 class Approach {
  public:
+  Approach() = default;
+  explicit Approach(const std::array<double, 3>& sides) : sides_(sides) {}
+
   /// `spring`: its frequency off the stop [rad/s], by which a gap counts as a rate.
   void observe(double gap, double rate, double spring) {
-    largest_ = std::max({largest_, std::abs(rate), std::abs(gap) * spring});
+    sides_[2] = std::max({sides_[2], std::abs(rate), std::abs(gap) * spring});
   }
-  void restart(double rate) {
-    before_[0] = before_[1], before_[1] = largest_;
-    largest_ = std::abs(rate);
-  }
-  bool has_decayed(double rate) const { return std::abs(rate) < 1e-3 * largest_; }
+  void restart(double rate) { sides_ = {sides_[1], sides_[2], std::abs(rate)}; }
+  bool has_decayed(double rate) const { return std::abs(rate) < 1e-3 * sides_[2]; }
   /// The largest on the two sides of the stop before the last crossing, and since.
-  double of_two_sides() const { return std::max({before_[0], before_[1], largest_}); }
-  double round_off() const { return 1e-14 * largest_; }
+  double of_two_sides() const { return std::max({sides_[0], sides_[1], sides_[2]}); }
+  double round_off() const { return 1e-14 * sides_[2]; }
+  const std::array<double, 3>& sides() const { return sides_; }
 
  private:
-  double largest_ = 0;                             // [rad/s] or [m/s]
-  std::array<double, 2> before_ = {1e300, 1e300};  // on the sides before that, older first; unknown at the start
+  std::array<double, 3> sides_{};  // older first [rad/s] or [m/s]
 };
 
 /// Contacts that follow each other without time passing: a flight that no longer goes on.

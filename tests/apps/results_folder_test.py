@@ -389,12 +389,12 @@ class Changed(Case):
     def test_version_of_the_format(self):
         out = self.run_sport("--duration", "0.2")
         good = (out / "state.toml").read_text()
-        for version in ("1", "3", "two"):
+        for version in ("1", "3", "4", "two"):
             (out / "state.toml").write_text(re.sub('"flexboom-state-.*?"', f'"flexboom-state-{version}"', good))
             result = flexboom("run", "sport", "--duration", "0.3", "--continue", out, "--out", self.folder / "later",
                               "--force")
             self.assert_exit(INPUT, result)
-            self.assertIn(f'is "flexboom-state-{version}"; this version reads "flexboom-state-4"', result.stderr)
+            self.assertIn(f'is "flexboom-state-{version}"; this version reads "flexboom-state-5"', result.stderr)
 
 
 class SlowKilled(Kills):
