@@ -183,9 +183,9 @@ void set_flown(const FlownByMultipliers& f, size_t first, size_t last, const std
     r.motion.y.push_back(f.y(row));
     r.motion.balance.push_back(balance_of(f.tree, f.flight, row, r.motion.y.back()));
   }
-  r.outputs = output_table(f.scene, f.tree, last - first, [&](size_t i) {
+  r.outputs = output_table(f.scene, f.tree, last - first, [&](size_t i, Moment& now) {
     const size_t row = first + i;
-    return Moment{f.flight.time[row], f.states[row], joint_loads(f.system, f.flight.states[row]), r.motion.balance[i]};
+    now = {f.flight.time[row], f.states[row], joint_loads(f.system, f.flight.states[row]), r.motion.balance[i]};
   });
   r.motion.warnings = warnings_of(f.scene, f.system.multibody(), f.flight, r.motion.stiffening_effect, stiffening);
   const MultibodyState& last_state = f.flight.states.back();

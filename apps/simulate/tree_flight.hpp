@@ -62,8 +62,9 @@ struct Moment {
   Balance balance;
 };
 
-/// Columns of trajectory.csv. The rows are asked for one after the other.
-OutputTable output_table(const Scene&, const Tree&, size_t rows, const std::function<Moment(size_t)>& moment);
+/// Columns of trajectory.csv. `moment` turns that of the row before into that of a row.
+OutputTable output_table(const Scene&, const Tree&, size_t rows,
+                         const std::function<void(size_t row, Moment&)>& moment);
 OutputTable output_table(const Scene&, const Tree&, const TreeTrajectory&);
 
 /// What was flown, one line each.

@@ -140,7 +140,7 @@ class Pointing {
 }  // namespace
 
 OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
-                         const std::function<Moment(size_t)>& moment) {
+                         const std::function<void(size_t row, Moment&)>& moment) {
   OutputTable table;
   Columns out(table, static_cast<Eigen::Index>(rows));
   const Pointing pointing(scene);
@@ -151,9 +151,10 @@ OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
   const size_t flying = first_that_flies(scene);
   std::optional<Orbit> orbit;
   if (scene.orbit && flying < scene.joints.size()) orbit = orbit_of(scene);
+  Moment now;
+  const TreeState& s = now.state;
   for (size_t row = 0; row < rows; ++row) {
-    const Moment now = moment(row);
-    const TreeState& s = now.state;
+    moment(row, now);
     out.put("t", "", now.time);
     for (size_t i = 0; i < scene.joints.size(); ++i) {
       put_joint(out, scene.joints[i], s.joints[i], centre);
@@ -180,13 +181,11 @@ OutputTable output_table(const Scene& scene, const Tree& tree, const TreeTraject
   const auto branches = [&](size_t row) {
     return motion.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(motion.laws[row]);
   };
-  return output_table(scene, tree, motion.time.size(), [&](size_t row) {
-    const double t = motion.time[row];
+  return output_table(scene, tree, motion.time.size(), [&](size_t row, Moment& now) {
     const VectorXd& y = motion.y[row];
-    return Moment{t, tree.unpack(y),
-                  loads ? tree.joint_loads(t, y, closed_stops(tree, y), branches(row))
-                        : std::vector<JointLoad>(scene.joints.size()),
-                  motion.balance[row]};
+    now.time = motion.time[row], now.balance = motion.balance[row];
+    tree.unpack(y, now.state);
+    if (loads) now.loads = tree.joint_loads(now.time, y, closed_stops(tree, y), branches(row));
   });
 }
 

@@ -222,7 +222,13 @@ VectorXd Tree::pack(const TreeState& s) const {
 }
 
 TreeState Tree::unpack(const Eigen::Ref<const VectorXd>& y) const {
-  TreeState s = at_rest();
+  TreeState s;
+  unpack(y, s);
+  return s;
+}
+
+void Tree::unpack(const Eigen::Ref<const VectorXd>& y, TreeState& s) const {
+  if (s.joints.empty()) s = at_rest();
   for (const tree::Link& link : impl_->model.links) {
     JointState& joint = s.joints[static_cast<size_t>(link.joint)];
     const JointType& type = joint_type(link.kind);
@@ -238,7 +244,6 @@ TreeState Tree::unpack(const Eigen::Ref<const VectorXd>& y) const {
     s.q_dot[static_cast<size_t>(link.index)] = y.segment(link.q_dot, link.body.n);
   }
   for (size_t i = 0; i < s.spin.size(); ++i) s.spin[i] = y[impl_->layout.spin + static_cast<int>(i)];
-  return s;
 }
 
 void Tree::impose(double t, Eigen::Ref<VectorXd> y) const {

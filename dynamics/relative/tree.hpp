@@ -107,6 +107,8 @@ class Tree {
   TreeState at_rest() const;
   Eigen::VectorXd pack(const TreeState&) const;
   TreeState unpack(const Eigen::Ref<const Eigen::VectorXd>& y) const;
+  /// The same into a state of this tree, where it is: row after row without new memory. A new one is made ready.
+  void unpack(const Eigen::Ref<const Eigen::VectorXd>& y, TreeState&) const;
 
   /// Sets what is prescribed at t. Integration keeps it to its tolerance; this to round-off.
   void impose(double t, Eigen::Ref<Eigen::VectorXd> y) const;
