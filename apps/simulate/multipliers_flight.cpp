@@ -124,7 +124,7 @@ std::vector<std::string> warnings_of(const Scene& scene, const Multibody& bodies
                                      const std::vector<LargestStiffening>& effect,
                                      const std::vector<Stiffening>& stiffening) {
   std::vector<std::string> warnings = stiffening_warnings(
-      bodies, effect, scene.tolerance, [&](int body) { return stiffening[static_cast<size_t>(body)]; });
+      bodies, effect, scene.duration, scene.tolerance, [&](int body) { return stiffening[static_cast<size_t>(body)]; });
   if (const auto& rows = flight.summary.redundant; !rows.empty())
     warnings.push_back(
         fmt::format("{} constraint rows follow from the others and are left out, so how these joints share such loads "

@@ -77,8 +77,8 @@ std::vector<std::string> softening_warnings(Scene scene, const Run& run) {
   }
   if (!any) return {};
   const Multibody multibody = make_multibody(scene, bodies);
-  return stiffening_warnings(multibody, largest_stiffening(Tree(multibody), run.motion), scene.tolerance,
-                             [](int) { return Stiffening::off; });
+  return stiffening_warnings(multibody, largest_stiffening(Tree(multibody), run.motion), scene.duration,
+                             scene.tolerance, [](int) { return Stiffening::off; });
 }
 
 /// Over the outputs, of long lists over some.

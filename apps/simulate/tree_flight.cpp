@@ -291,8 +291,8 @@ bool revise_stiffening(const Scene& scene, const Multibody& bodies, const std::v
                        std::vector<Stiffening>& choice) {
   bool changed = false;
   for (size_t i = 0; i < choice.size(); ++i) {
-    const bool wanted =
-        scene.bodies[i].stiffening == "auto" && has_stiffening(bodies.bodies[i]) && effect[i].size > scene.tolerance;
+    const bool wanted = scene.bodies[i].stiffening == "auto" && has_stiffening(bodies.bodies[i]) &&
+                        change_without_stiffening(bodies.bodies[i], effect[i].size, scene.duration) > scene.tolerance;
     if (!wanted || choice[i] == Stiffening::on) continue;
     choice[i] = Stiffening::on;
     changed = true;

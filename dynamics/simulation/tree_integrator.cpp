@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace flexboom {
 
@@ -243,8 +244,8 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     s.energy_balance = kept.energy_balance();
     if (is_isolated(tree_.scene())) s.momentum_drift = kept.momentum_drift();
     result_.stiffening_effect = effect_;
-    result_.warnings = stiffening_warnings(tree_.scene(), effect_, options_.tolerance,
-                                           [this](int body) { return tree_.stiffening(body); });
+    result_.warnings = stiffening_warnings(tree_.scene(), effect_, options_.duration - options_.start,
+                                           options_.tolerance, [this](int body) { return tree_.stiffening(body); });
   }
 
   const Tree& tree_;
@@ -272,17 +273,31 @@ void observe(const std::vector<StiffeningEffect>& effect, double t, std::vector<
   }
 }
 
+double change_without_stiffening(const ReducedBody& body, double size, double duration) {
+  double slowest = std::numeric_limits<double>::infinity(), damping = 0;
+  for (int k = 0; k < body.n(); ++k) {
+    const double omega = std::sqrt(body.Ke(k, k) / body.Me(k, k));
+    if (omega > 0 && omega < slowest)
+      slowest = omega, damping = 0.5 * body.De(k, k) / std::sqrt(body.Ke(k, k) * body.Me(k, k));
+  }
+  if (!std::isfinite(slowest)) return size;
+  const double x = std::min(slowest * duration, 1 / damping);
+  return size * std::max(1.0, 0.5 * x * std::exp(-damping * x));
+}
+
 std::vector<std::string> stiffening_warnings(const Multibody& scene, const std::vector<LargestStiffening>& effect,
-                                             double tolerance, const std::function<Stiffening(int body)>& stiffening) {
+                                             double duration, double tolerance,
+                                             const std::function<Stiffening(int body)>& stiffening) {
   std::vector<std::string> warnings;
   for (size_t b = 0; b < effect.size(); ++b) {
     const std::string& name = scene.bodies[b].name;
-    if (effect[b].size > tolerance && stiffening(static_cast<int>(b)) == Stiffening::off)
-      warnings.push_back(
-          fmt::format("body {}: its geometric stiffness is off; it reaches {:.2g} of its stiffness, more than the "
-                      "tolerance {:.2g}{}",
-                      name, effect[b].size, tolerance,
-                      effect[b].size > 0.1 ? ": without it the motion can be wrong or diverge" : ""));
+    const double change = change_without_stiffening(scene.bodies[b], effect[b].size, duration);
+    if (change > tolerance && stiffening(static_cast<int>(b)) == Stiffening::off)
+      warnings.push_back(fmt::format(
+          "body {}: its geometric stiffness is off; it reaches {:.2g} of its stiffness, which changes about "
+          "{:.2g}, more than the tolerance {:.2g}{}",
+          name, effect[b].size, change, tolerance,
+          effect[b].size > 0.1 ? ": without it the motion can be wrong or diverge" : ""));
     if (effect[b].softening > 1)
       warnings.push_back(
           fmt::format("body {}: at t = {:.6g} s its geometric stiffness takes {:.2g} of its stiffness "
@@ -361,7 +376,7 @@ std::vector<Stiffening> stiffening_where_it_counts(const Multibody& scene, const
     tree.impose(t, y);
     const std::vector<StiffeningEffect> effect = tree.stiffening_effect(t, y, open);
     for (size_t b = 0; b < effect.size(); ++b)
-      if (effect[b].size > tolerance) choice[b] = Stiffening::on;
+      if (change_without_stiffening(scene.bodies[b], effect[b].size, duration) > tolerance) choice[b] = Stiffening::on;
   }
   return choice;
 }

@@ -16,10 +16,15 @@ struct LargestStiffening {
 };
 void observe(const std::vector<StiffeningEffect>&, double t, std::vector<LargestStiffening>&);
 
-/// Names each body whose geometric stiffness is off although its effect exceeds the tolerance, or takes all stiffness
-/// away.
-std::vector<std::string> stiffening_warnings(const Multibody&, const std::vector<LargestStiffening>&, double tolerance,
-                                             const std::function<Stiffening(int body)>&);
+/// What a geometric stiffness of this size (of StiffeningEffect) changes where it is left out for so long [s], relative
+/// to what the body does: its size; or more, for a mode that is stiffer by e runs ahead by e / 2 for each radian that
+/// it turns. Of the slowest mode; its damping leaves x exp(-zeta x) of x radians.
+double change_without_stiffening(const ReducedBody&, double size, double duration);
+
+/// Names each body whose geometric stiffness is off although it would change more than the tolerance, or takes all
+/// stiffness away.
+std::vector<std::string> stiffening_warnings(const Multibody&, const std::vector<LargestStiffening>&, double duration,
+                                             double tolerance, const std::function<Stiffening(int body)>&);
 
 /// Per joint: is its stop closed where gaps alone say so?
 std::vector<char> closed_stops(const Tree&, const Eigen::Ref<const Eigen::VectorXd>& y);
@@ -43,8 +48,8 @@ std::vector<LargestStiffening> largest_stiffening(const Tree&, const TreeTraject
 TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const IntegratorOptions&,
                          const Checkpoint<TreeTrajectory>& = {});
 
-/// For each body: on where the geometric stiffness exceeds `tolerance` of Ke at the start or, at rest relative to them,
-/// under the prescribed motions until `duration` [s].
+/// For each body: on where the geometric stiffness changes more than `tolerance` (`change_without_stiffening`), by what
+/// it is at the start or, at rest relative to them, under the prescribed motions until `duration` [s].
 std::vector<Stiffening> stiffening_where_it_counts(const Multibody&, const TreeState&, double duration,
                                                    double tolerance);
 

@@ -442,6 +442,23 @@ TEST(Stiffening, SpinNearTheFirstFrequencyIsRightWithItAndSaidToBeWrongWithout) 
   }
 }
 
+// An oscillator beside one that is stiffer by e, let go at 1: the largest difference of both.
+TEST(Stiffening, LeftOutItDriftsByHalfOfItForEachRadian) {
+  ReducedBody body = stiffened_boom({10, 1.2, 1.4e4}, 1, eq14::Planes::xy);
+  const double omega = std::sqrt(body.Ke(0, 0) / body.Me(0, 0)), e = 1e-4;
+  for (const double zeta : {0.0, 0.005, 0.05})
+    for (const double radians : {30.0, 300.0}) {
+      body.De(0, 0) = 2 * zeta * std::sqrt(body.Ke(0, 0) * body.Me(0, 0));
+      double largest = 0;
+      for (double x = 0; x < radians; x += 0.01) {
+        const auto moved = [&](double faster) { return std::exp(-zeta * x) * std::cos(faster * x); };
+        largest = std::max(largest, std::abs(moved(std::sqrt(1 + e)) - moved(1)));
+      }
+      const double said = change_without_stiffening(body, e, radians / omega);
+      EXPECT_NEAR(said, std::max(e, largest), 0.1 * said) << zeta << ", " << radians;
+    }
+}
+
 TEST(Stiffening, SpinUpWithoutItDivergesAndIsWarnedAbout) {
   const SpinUp off = spin_up_run(3, Stiffening::off, 15);
   EXPECT_GT(off.error, 10);
