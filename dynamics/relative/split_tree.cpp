@@ -82,15 +82,15 @@ class SplitTree final : public SplitProblem {
     tree::Scratch<double>& scratch = work_->scratch;
     Vector3d force = Vector3d::Zero();
     double m = 0;
-    const auto counts = [&](size_t link) { return root_of_[link] == static_cast<int>(root); };
+    const tree::HungOn bodies = of(root);
     for (const size_t i : scratch.singles) {
-      if (!counts(i)) continue;
+      if (!bodies.counts(i)) continue;
       m += model_.links[i].body.m;
       if (model_.poses) force += eigen(scratch.links[i].A0 * scratch.links[i].external.t);
     }
     for (size_t i = 0; i < scratch.leaves.size(); ++i) {
       const tree::Leaves& leaves = model_.leaves[i];
-      if (!counts(static_cast<size_t>(leaves.link[0]))) continue;
+      if (!bodies.counts(static_cast<size_t>(leaves.link[0]))) continue;
       const tree::LinkScratch<Quad>& s = scratch.leaves[i].link;
       m += sum(leaves.body.m, leaves.count);
       if (tree_.scene().field) force += eigen(tree::sum(s.A0 * s.external.t, leaves.count));

@@ -244,8 +244,8 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     s.energy_balance = kept.energy_balance();
     if (is_isolated(tree_.scene())) s.momentum_drift = kept.momentum_drift();
     result_.stiffening_effect = effect_;
-    result_.warnings = stiffening_warnings(tree_.scene(), effect_, options_.duration - options_.start,
-                                           options_.tolerance, [this](int body) { return tree_.stiffening(body); });
+    result_.warnings = stiffening_warnings(tree_.scene(), effect_, options_.duration, options_.tolerance,
+                                           [this](int body) { return tree_.stiffening(body); });
   }
 
   const Tree& tree_;
@@ -277,8 +277,7 @@ double change_without_stiffening(const ReducedBody& body, double size, double du
   double slowest = std::numeric_limits<double>::infinity(), damping = 0;
   for (int k = 0; k < body.n(); ++k) {
     const double omega = std::sqrt(body.Ke(k, k) / body.Me(k, k));
-    if (omega > 0 && omega < slowest)
-      slowest = omega, damping = 0.5 * body.De(k, k) / std::sqrt(body.Ke(k, k) * body.Me(k, k));
+    if (omega > 0 && omega < slowest) slowest = omega, damping = 0.5 * body.De(k, k) / (body.Me(k, k) * omega);
   }
   if (!std::isfinite(slowest)) return size;
   const double x = std::min(slowest * duration, 1 / damping);
