@@ -50,13 +50,16 @@ std::string no_tip(const ReducedBody& body) {
       names.empty() ? "no markers" : fmt::format("{}", fmt::join(names, ", ")));
 }
 
-Vector3d displacement(const ReducedBody& body, const Marker& at, const VectorXd& q, Stiffening stiffening) {
-  if (q.size() == 0) return Vector3d::Zero();
-  Vector3d u = at.S * q;
-  if (stiffening == Stiffening::off) return u;
+MarkerDisplacement::MarkerDisplacement(const ReducedBody& body, const Marker& at) : S_(at.S) {
   for (const MarkerStiffness& k : body.Kg.markers)
     for (size_t i = 0; k.marker == at.name && i < k.force.size(); ++i)
-      u[static_cast<Index>(i)] -= 0.5 * q.dot(k.force[i] * q);
+      if (!k.force[i].isZero(0)) Kf_[i] = k.force[i];
+}
+
+Vector3d MarkerDisplacement::operator()(const VectorXd& q) const {
+  Vector3d u = S_.lazyProduct(q);
+  for (size_t i = 0; i < Kf_.size(); ++i)
+    if (Kf_[i].size() > 0) u[static_cast<Index>(i)] -= 0.5 * q.dot(Kf_[i].lazyProduct(q));
   return u;
 }
 

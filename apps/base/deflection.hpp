@@ -1,9 +1,10 @@
 #pragma once
 
-#include "dynamics/model/multibody.hpp"
+#include "reduction/body/reduced_body.hpp"
 
 #include <Eigen/Core>
 
+#include <array>
 #include <string>
 
 /// How far bodies bend.
@@ -16,8 +17,17 @@ const Marker* tip_of(const ReducedBody&);
 /// Says so of a body that has none: which markers it has.
 std::string no_tip(const ReducedBody&);
 
-/// Elastic displacement of a marker, BRF [m]: S q, and what geometric stiffness adds of second order, -1/2 q^T Kf q.
-Eigen::Vector3d displacement(const ReducedBody&, const Marker&, const Eigen::VectorXd& q, Stiffening);
+/// Elastic displacement of a marker, BRF [m]: S q, and of second order -1/2 q^T Kf q, where the body has the geometric
+/// stiffness Kf of forces at the marker. An output has it whether or not the equations do: it is the larger part.
+class MarkerDisplacement {
+ public:
+  MarkerDisplacement(const ReducedBody&, const Marker&);
+  Eigen::Vector3d operator()(const Eigen::VectorXd& q) const;
+
+ private:
+  Eigen::Matrix3Xd S_;
+  std::array<Eigen::MatrixXd, 3> Kf_;  // per axis; empty: none
+};
 
 /// Largest elastic displacement of a body over its markers and the points of its picture, by its length.
 class Deflection {

@@ -149,8 +149,7 @@ Scene scene_of_table(const Value& root, Reading& reading) {
   Scene scene;
   read_keys(table, reading, scene, scene_keys_of_file);
   for (BodyScene& body : scene.bodies)
-    if ((scene.is_tree || body.basis.name == "prestressed") && body.stiffening.empty() && !body.rigid)
-      body.stiffening = "auto";
+    if (body.stiffening.empty() && body.is_boom()) body.stiffening = "auto";
   for (JointScene& j : scene.joints) look_up(scene, j.a), look_up(scene, j.b);
   for (SpringScene& s : scene.springs) look_up(scene, s.a), look_up(scene, s.b);
   for (LoadScene& l : scene.loads) look_up(scene, l.at);

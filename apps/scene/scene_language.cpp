@@ -291,7 +291,7 @@ bool beyond_a_hub(KeyReader& reader, const Scene& s) {
                              [&](const char* key) { return reader.has(key); }) ||
          std::ranges::any_of(s.hinges, [](const HingeScene& h) { return h.law.given(); }) ||
          std::ranges::any_of(s.bodies, [](const BodyScene& b) {
-           return b.rigid || !b.reduced_file.empty() || !b.stiffening.empty() || b.root_moves();
+           return b.rigid || !b.reduced_file.empty() || b.root_moves();
          });
 }
 

@@ -132,6 +132,7 @@ std::vector<TransientComparison> compare_transients(const Scene& given) {
       if (!not_comparable(b).empty()) continue;
       b = with_model(b, theory, rotary);
       b.structure = structure;
+      b.stiffening.clear();  // eq. 14 has none, not even the foreshortening of the tip
     }
     return run_scene(scene, {}).outputs;
   };

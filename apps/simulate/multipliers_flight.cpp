@@ -114,7 +114,7 @@ Balance balance_of(const Tree& tree, const MultibodyTrajectory& flight, size_t r
 /// At every output of a short list, at some of a long one.
 std::vector<LargestStiffening> largest_stiffening(const Multipliers& system, const MultibodyTrajectory& flight) {
   std::vector<LargestStiffening> largest(system.multibody().bodies.size());
-  const size_t stride = flight.states.size() / 500 + 1;
+  const size_t stride = flight.states.size() / looks_at_stiffening + 1;
   for (size_t row = 0; row < flight.states.size(); row += stride)
     observe(stiffening_effect(system, flight.time[row], flight.states[row]), flight.time[row], largest);
   return largest;

@@ -74,7 +74,6 @@ Scene Planner::with_candidates(const Scene& scene, int candidates, const RunHook
     BodyScene& b = all.bodies[i];
     b.modes_auto = false;
     b.open_directions();
-    if (b.stiffening.empty() && b.structure != "eq14") b.stiffening = "auto";
     const int wanted = b.directions == "all" ? candidates : candidates / 2;
     b = with_modes(b, wanted, scene.bodies_kept_in, hooks);
   }

@@ -58,29 +58,6 @@ FlightState end_of(const std::vector<PreparedBody>& bodies, double time, const V
 
 namespace {
 
-/// Does a body whose model leaves geometric stiffness out turn so fast that it may be as large as its own?
-bool spins_fast(const Run& run, size_t body) {
-  constexpr double fast = 0.3;  // (Omega / omega_1)^2
-  const ReducedBody& b = run.bodies[body].body;
-  return b.n() > 0 && std::pow(largest_rate(run, body), 2) * b.Me(0, 0) > fast * b.Ke(0, 0);
-}
-
-/// Where geometric stiffness is left out of the model and may matter its size is looked at.
-std::vector<std::string> softening_warnings(Scene scene, const Run& run) {
-  std::vector<PreparedBody> bodies = run.bodies;
-  bool any = false;
-  for (size_t i = 0; i < bodies.size(); ++i) {
-    BodyScene& b = scene.bodies[i];
-    if (!b.stiffening.empty() || !b.is_boom() || b.structure == "eq14" || !spins_fast(run, i)) continue;
-    b.stiffening = "on", any = true;
-    bodies[i] = prepare_body(b, 0, scene.bodies_kept_in);
-  }
-  if (!any) return {};
-  const Multibody multibody = make_multibody(scene, bodies);
-  return stiffening_warnings(multibody, largest_stiffening(Tree(multibody), run.motion), scene.duration,
-                             scene.tolerance, [](int) { return Stiffening::off; });
-}
-
 /// Over the outputs, of long lists over some.
 std::vector<Bending> bending_of(const Run& run) {
   std::vector<Bending> bending;
@@ -99,17 +76,6 @@ std::vector<Bending> bending_of(const Run& run) {
 }
 
 }  // namespace
-
-double largest_rate(const Run& run, size_t body) {
-  double most = 0;
-  const size_t stride = run.motion.y.size() / 500 + 1;
-  for (size_t row = 0; row < run.motion.y.size(); row += stride)
-    most = std::max(
-        most,
-        run.tree->motion(run.motion.time[row], run.motion.y[row], Place{.body = static_cast<int>(body), .marker = {}})
-            .omega.norm());
-  return most;
-}
 
 PreparedBody prepared(const BodyScene& b, int refine, const std::filesystem::path& keep, const RunHooks& hooks) {
   return hooks.bodies != nullptr ? hooks.bodies->get(b, refine, keep) : prepare_body(b, refine, keep);
@@ -193,8 +159,7 @@ void add_warnings(const Run& run, RunResult& r) {
           fmt::format("body {}: it bends by {:.3g} m at t = {:.6g} s, {:.0f} % of its length: the theory "
                       "of small deflections no longer holds",
                       run.bodies[i].body.name, b.size, b.time, 100 * b.of_length));
-  for (const std::vector<std::string>& more : {run.motion.warnings, softening_warnings(with_joints(r.scene), run)})
-    r.warnings.insert(r.warnings.end(), more.begin(), more.end());
+  r.warnings.insert(r.warnings.end(), run.motion.warnings.begin(), run.motion.warnings.end());
   if (!r.budget.measured) warn_of_the_balance(run.motion.summary, r);
   if (!r.budget.measured || r.budget.within(r.scene.tolerance)) return;
   const std::string why =

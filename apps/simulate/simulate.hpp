@@ -92,9 +92,6 @@ struct Run {
 /// What a scene asks of an integrator; `chosen`: the method where it leaves the choice. `max_steps` as of run_once.
 IntegratorOptions integrator_options(const Scene&, const RunHooks&, std::string_view chosen, long max_steps);
 
-/// The largest angular velocity of a body's frame in a flight [rad/s].
-double largest_rate(const Run&, size_t body);
-
 /// prepare_body, or what other runs have made.
 PreparedBody prepared(const BodyScene&, int refine, const std::filesystem::path& keep, const RunHooks&);
 

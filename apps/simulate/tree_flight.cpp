@@ -279,7 +279,7 @@ std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& bo
   if (std::ranges::none_of(bodies.bodies, has_stiffening)) return none;
   const Tree plain(bodies);
   std::vector<Stiffening> choice =
-      stiffening_where_it_counts(bodies, plain.unpack(first_state(scene, plain)), scene.duration, scene.tolerance);
+      stiffening_where_it_counts(plain, first_state(scene, plain), scene.duration, scene.tolerance);
   for (size_t i = 0; i < choice.size(); ++i) {
     if (scene.bodies[i].stiffening == "on" && bodies.bodies[i].n() > 0) choice[i] = Stiffening::on;
     if (scene.bodies[i].stiffening == "off" || !has_stiffening(bodies.bodies[i])) choice[i] = Stiffening::off;

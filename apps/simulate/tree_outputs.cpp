@@ -82,12 +82,10 @@ void put_joint(Columns& out, const JointScene& joint, const JointState& s, const
   out.put(name, ".position", position), out.put(name, ".velocity", s.velocity);
 }
 
-/// `tip`: nullptr where the body has none.
-void put_body(Columns& out, const Tree& tree, size_t number, const Marker* tip, const VectorXd& q) {
-  const ReducedBody& body = tree.scene().bodies[number];
-  out.put_numbered(body.name, ".q", q);
-  if (tip != nullptr)
-    out.put(body.name, ".tip", displacement(body, *tip, q, tree.stiffening(static_cast<int>(number))));
+/// `tip`: none where the body has none.
+void put_body(Columns& out, const std::string& name, const std::optional<MarkerDisplacement>& tip, const VectorXd& q) {
+  out.put_numbered(name, ".q", q);
+  if (tip) out.put(name, ".tip", (*tip)(q));
 }
 
 void put_load(Columns& out, const JointScene& joint, const JointLoad& load) {
@@ -146,8 +144,10 @@ OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
   const Pointing pointing(scene);
   Vector3d centre = Vector3d::Zero();
   if (tree.scene().field) centre = mass_centre(tree, start_state(without_loops(scene), tree));
-  std::vector<const Marker*> tips;
-  for (const ReducedBody& body : tree.scene().bodies) tips.push_back(body.n() > 0 ? tip_of(body) : nullptr);
+  std::vector<std::optional<MarkerDisplacement>> tips(tree.scene().bodies.size());
+  for (size_t b = 0; b < tips.size(); ++b)
+    if (const ReducedBody& body = tree.scene().bodies[b]; const Marker* tip = body.n() > 0 ? tip_of(body) : nullptr)
+      tips[b].emplace(body, *tip);
   const size_t flying = first_that_flies(scene);
   std::optional<Orbit> orbit;
   if (scene.orbit && flying < scene.joints.size()) orbit = orbit_of(scene);
@@ -160,7 +160,7 @@ OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
       put_joint(out, scene.joints[i], s.joints[i], centre);
       if (scene.joints[i].loads) put_load(out, scene.joints[i], now.loads[i]);
     }
-    for (size_t b = 0; b < scene.bodies.size(); ++b) put_body(out, tree, b, tips[b], s.q[b]);
+    for (size_t b = 0; b < scene.bodies.size(); ++b) put_body(out, scene.bodies[b].name, tips[b], s.q[b]);
     for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name, ".spin", s.spin[w]);
     pointing.put(out, now.time, s);
     if (orbit) {
@@ -210,7 +210,7 @@ void describe_model(const Scene& scene, const Run& run, std::vector<std::string>
               : fmt::format("{}: geometric stiffness is not in the equations{}", b.name,
                             b.reduced               ? ": it is not in the file"
                             : b.structure == "eq14" ? ": structure \"eq14\" has none"
-                                                    : "; what it may change is error_budget.linearisation"));
+                                                    : ""));
   }
   for (const JointScene& j : scene.joints)
     plan.push_back(fmt::format("joint {}: {}, {} on {}{}{}", j.name, joint_type(j.kind).name, j.b.body,

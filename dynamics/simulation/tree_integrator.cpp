@@ -223,7 +223,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   void look_at_stiffening(double t, const VectorXd& y) {
     if (!has_stiffening_) return;
     const double outputs = (options_.duration - options_.start) / options_.output_step;
-    const auto stride = static_cast<size_t>(outputs / 500) + 1;
+    const auto stride = static_cast<size_t>(outputs / looks_at_stiffening) + 1;
     if (result_.time.size() % stride != 0) return;
     std::vector<char> contact(tree_.scene().joints.size(), 0);
     for (size_t i = 0; i < contacts_.size(); ++i) contact[contacts_.stop(i).joint] = contacts_.closed()[i];
@@ -306,25 +306,6 @@ std::vector<std::string> stiffening_warnings(const Multibody& scene, const std::
   return warnings;
 }
 
-namespace {
-
-std::span<const LawBranch> laws_at(const TreeTrajectory& flight, size_t row) {
-  return flight.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(flight.laws[row]);
-}
-
-}  // namespace
-
-std::vector<LargestStiffening> largest_stiffening(const Tree& tree, const TreeTrajectory& flight) {
-  std::vector<LargestStiffening> largest(tree.scene().bodies.size());
-  const size_t stride = flight.y.size() / 500 + 1;
-  for (size_t row = 0; row < flight.y.size(); row += stride) {
-    const VectorXd& y = flight.y[row];
-    observe(tree.stiffening_effect(flight.time[row], y, closed_stops(tree, y), laws_at(flight, row)), flight.time[row],
-            largest);
-  }
-  return largest;
-}
-
 std::vector<char> closed_stops(const Tree& tree, const Eigen::Ref<const VectorXd>& y) {
   std::vector<char> closed(tree.scene().joints.size(), 0);
   for (const int joint : tree.stops()) closed[static_cast<size_t>(joint)] = tree.gap(y.data(), joint) > 0;
@@ -363,15 +344,17 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   }
 }
 
-std::vector<Stiffening> stiffening_where_it_counts(const Multibody& scene, const TreeState& state, double duration,
-                                                   double tolerance) {
-  const Tree tree(scene);
-  VectorXd y = tree.pack(state);
+std::vector<Stiffening> stiffening_where_it_counts(const Tree& tree, VectorXd y, double duration, double tolerance) {
+  const Multibody& scene = tree.scene();
   const std::vector<char> open(scene.joints.size(), 0);
   std::vector<Stiffening> choice(scene.bodies.size(), Stiffening::off);
-  constexpr int samples = 100;
+  const bool goes_with_time =
+      scene.field || !scene.loads.empty() ||
+      std::ranges::any_of(scene.joints, [](const Joint& joint) { return !joint.prescribed.empty(); }) ||
+      std::ranges::any_of(scene.wheels, [](const ReactionWheel& w) { return static_cast<bool>(w.torque); });
+  const int samples = goes_with_time ? 100 : 0;
   for (int i = 0; i <= samples; ++i) {
-    const double t = duration * i / samples;
+    const double t = i == 0 ? 0 : duration * i / samples;
     tree.impose(t, y);
     const std::vector<StiffeningEffect> effect = tree.stiffening_effect(t, y, open);
     for (size_t b = 0; b < effect.size(); ++b)

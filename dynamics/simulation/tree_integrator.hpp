@@ -14,6 +14,8 @@ struct LargestStiffening {
   double size = 0, softening = 0;
   double time = 0;  // of the largest softening [s]
 };
+/// A long flight is looked at this often: each look costs an evaluation and an eigenvalue problem per body.
+inline constexpr int looks_at_stiffening = 200;
 void observe(const std::vector<StiffeningEffect>&, double t, std::vector<LargestStiffening>&);
 
 /// What a geometric stiffness of this size (of StiffeningEffect) changes where it is left out for so long [s], relative
@@ -40,9 +42,6 @@ struct TreeTrajectory {
   std::vector<std::string> warnings;
 };
 
-/// At the rows of a flight, of long ones at some.
-std::vector<LargestStiffening> largest_stiffening(const Tree&, const TreeTrajectory&);
-
 /// Flies the tree from y0. Method "auto": the one that suits its start, and bdf where that fails.
 /// @throws InputError for an unknown method or bad options; NumericalError when the method fails.
 TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const IntegratorOptions&,
@@ -50,7 +49,6 @@ TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const Integrato
 
 /// For each body: on where the geometric stiffness changes more than `tolerance` (`change_without_stiffening`), by what
 /// it is at the start or, at rest relative to them, under the prescribed motions until `duration` [s].
-std::vector<Stiffening> stiffening_where_it_counts(const Multibody&, const TreeState&, double duration,
-                                                   double tolerance);
+std::vector<Stiffening> stiffening_where_it_counts(const Tree&, Eigen::VectorXd y0, double duration, double tolerance);
 
 }  // namespace flexboom

@@ -130,6 +130,7 @@ TEST(BudgetOfAHub, CountsWhatGeometricStiffnessChanges) {
   hub.tolerance = tree.tolerance = 1e-6;
   hub.duration = tree.duration = 2;
   hub.bodies[0].damping = tree.bodies[0].damping = {};
+  hub.bodies[0].stiffening = "off";
   tree.error_budget = false;
   const RunResult r = run_scene(hub, {}), truth = run_scene(tree, {});
   const double change = largest(compare_outputs(r.outputs, truth.outputs, {"boom.angle", "boom.tip"}));
@@ -407,6 +408,27 @@ TEST(WithoutBudget, StiffnessThatDriftsIsNotLeftOut) {
   EXPECT_LT(
       largest(compare_outputs(run.outputs, run_scene(with_stiffening(scene), {}).outputs, {}, floors_of(scene, {}))),
       10 * run.scene.tolerance);
+}
+
+// The booms of SPORT are stiffened by up to 9e-6 of their stiffness. The foreshortening of their tips is 5e-4 of the
+// displacement; the tips have it with and without that stiffness.
+TEST(WithoutBudget, AHubWithHingesHasTheStiffnessThatItsToleranceAsksFor) {
+  Scene scene = load_scene("sport");
+  scene.error_budget = false, scene.tolerance = 1e-9;
+  const RunResult reference = run_scene(with_stiffening(scene), {});
+  const auto error = [&](const RunResult& r) {
+    return largest(compare_outputs(r.outputs, reference.outputs, {}, floors_of(r.scene, r.bodies)));
+  };
+  for (const auto& [tolerance, expected] : {std::pair{1e-3, Stiffening::off}, {1e-7, Stiffening::on}}) {
+    scene.tolerance = tolerance;
+    const RunResult run = run_scene(scene, {});
+    EXPECT_EQ(run.tree->stiffening(3), expected) << tolerance;
+    EXPECT_LT(error(run), 10 * tolerance);
+  }
+  for (BodyScene& b : scene.bodies) b.stiffening = "off";
+  const double without = error(run_scene(scene, {}));
+  EXPECT_GT(without, 10 * scene.tolerance);
+  EXPECT_LT(without, 1e-5);
 }
 
 }  // namespace

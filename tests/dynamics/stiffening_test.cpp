@@ -465,9 +465,9 @@ TEST(Stiffening, SpinUpWithoutItDivergesAndIsWarnedAbout) {
   ASSERT_EQ(off.flight.warnings.size(), 1u);
   EXPECT_NE(off.flight.warnings[0].find("geometric stiffness is off"), std::string::npos);
   const Multibody scene = rotor(stiffened_boom({10, 1.2, 1.4e4}, 3, eq14::Planes::xy), spin_up());
-  EXPECT_EQ(stiffening_where_it_counts(scene, Tree(scene).at_rest(), 30, 1e-3)[0], Stiffening::on);
-  EXPECT_EQ(stiffening_where_it_counts(rotor(scene.bodies[0], turning(1e-3)), Tree(scene).at_rest(), 30, 1e-3)[0],
-            Stiffening::off);
+  const Tree fast(scene), slow(rotor(scene.bodies[0], turning(1e-3)));
+  EXPECT_EQ(stiffening_where_it_counts(fast, fast.pack(fast.at_rest()), 30, 1e-3)[0], Stiffening::on);
+  EXPECT_EQ(stiffening_where_it_counts(slow, slow.pack(slow.at_rest()), 30, 1e-3)[0], Stiffening::off);
   ReducedBody without = scene.bodies[0];
   without.Kg = {};
   EXPECT_THROW(Tree(rotor(without, spin_up()), {Stiffening::on}), InputError);

@@ -145,6 +145,7 @@ TEST(Sport, BeamsWithoutShearAndRotaryInertiaFlyLikeEq14) {
     b.geometry.theory = BeamTheory::euler_bernoulli;
     b.geometry.rotary_inertia = false;
     b.geometry.order = 8;
+    b.stiffening.clear();
   }
   const OutputTable beams = run_scene(scene, {}).outputs;
   for (BodyScene& b : scene.bodies) b.structure = "eq14";
