@@ -117,9 +117,10 @@ PreparedBody prepare_model(const BodyScene& b, int refine) {
   return r;
 }
 
-/// A body with all its shapes.
+/// A body with all its shapes. Whether the equations have its geometric stiffness does not change it.
 std::string all_that_makes(BodyScene b, int refine) {
   b.shapes.clear();
+  if (!b.stiffening.empty()) b.stiffening = "auto";
   return fmt::format("{}\nrefined {}\nflexboom {}\n", to_toml(b), refine, version);
 }
 
@@ -199,14 +200,18 @@ PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem:
 PreparedBody PreparedBodies::get(const BodyScene& b, int refine, const std::filesystem::path& keep) {
   if (!b.is_boom()) return prepare_body(b, refine, keep);
   constexpr size_t most = 200;  // bodies that vary are met once: what they take of the memory must end
-  const std::string made_of = all_that_makes(b, refine);
+  BodyScene unnamed = b;
+  if (b.structure == "beam") unnamed.name.clear();  // solids are kept by their names
+  const std::string made_of = all_that_makes(unnamed, refine);
   auto found = whole_.find(made_of);
   if (found == whole_.end()) {
     PreparedBody made = with_all_shapes(b, refine, keep);
     if (whole_.size() >= most) whole_.clear();
     found = whole_.emplace(made_of, std::move(made)).first;
   }
-  return with_shapes(found->second, b);
+  PreparedBody p = with_shapes(found->second, b);
+  p.body.name = b.name;
+  return p;
 }
 
 }  // namespace flexboom

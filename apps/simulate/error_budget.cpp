@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace flexboom {
 
@@ -17,16 +19,81 @@ using Richer = std::optional<ReducedBody> RicherBodies::*;
 
 bool has(const BodyScene& b, Richer richer) { return b.richer && ((*b.richer).*richer).has_value(); }
 
+std::map<std::string, int> kinds_of(const PreparedBody& p) {
+  std::map<std::string, int> kinds;
+  for (const Coordinate& c : p.body.coordinates) ++kinds[c.kind];
+  return kinds;
+}
+
+/// Where the modes of a body are among all that bend in either plane, twist or stretch it: `all` has them.
+std::vector<int> places_of(const PreparedBody& own, bool in_plane, const PreparedBody& all) {
+  if (!own.shapes.empty()) return own.shapes;
+  std::vector<int> places;
+  if (!in_plane) {
+    for (int k = 1; k <= own.body.n(); ++k) places.push_back(k);
+    return places;
+  }
+  std::map<std::string, int> missing = kinds_of(own);
+  for (size_t k = 0; k < all.body.coordinates.size(); ++k)
+    if (missing[all.body.coordinates[k].kind]-- > 0) places.push_back(static_cast<int>(k) + 1);
+  return places;
+}
+
+/// Its own modes and the lowest beside them: `more` of each kind that it has, half as many of others.
+BodyScene with_more_of_each_kind(const BodyScene& b, int more, const std::filesystem::path& keep,
+                                 const RunHooks& hooks) {
+  constexpr int most_trials = 4;
+  const bool in_plane = b.directions != "all";
+  const PreparedBody own = prepared(b, 0, keep, hooks);
+  BodyScene richer = b;
+  richer.directions = "all";
+  for (int i = 1;; ++i) {
+    const int highest = in_plane ? 2 * b.modes : own.shapes.empty() ? own.body.n() : own.shapes.back();
+    const int wanted = std::max(b.modes, highest + 2 * i * more);
+    richer = with_modes(std::move(richer), wanted, keep, hooks);
+    const PreparedBody all = prepared(richer, 0, keep, hooks);
+    const std::vector<int> places = places_of(own, in_plane, all);
+    const std::map<std::string, int> kinds = kinds_of(own);
+    std::map<std::string, int> beside;
+    std::vector<int> shapes;
+    for (int k = 1; k <= all.body.n(); ++k) {
+      const std::string& kind = all.body.coordinates[static_cast<size_t>(k) - 1].kind;
+      const int of_kind = kinds.empty() || kinds.contains(kind) ? more : more / 2;
+      if (std::ranges::find(places, k) != places.end() || ++beside[kind] <= of_kind) shapes.push_back(k);
+    }
+    const bool enough = std::ranges::all_of(kinds, [&](const auto& kind) { return beside[kind.first] >= more; });
+    if (!enough && i < most_trials && richer.modes == wanted) continue;
+    richer.shapes = std::move(shapes);
+    return richer;
+  }
+}
+
 }  // namespace
 
-Scene with_more_modes(Scene scene, int times) {
+BodyScene with_modes(BodyScene b, int wanted, const std::filesystem::path& keep, const RunHooks& hooks) {
+  b.shapes.clear();
+  for (b.modes = wanted; b.modes > 2; b.modes -= 2) {
+    try {
+      prepared(b, 0, keep, hooks);
+      break;
+    } catch (const InputError&) {  // that is another fault where two modes have it, too
+    }
+  }
+  return b;
+}
+
+Scene with_more_modes(Scene scene, int more, const RunHooks& hooks) {
   for (BodyScene& b : scene.bodies) {
     if (has(b, &RicherBodies::more_modes)) {
       b.reduced = {b.richer, &*b.richer->more_modes};
       b.richer = nullptr;  // of those modes there is nothing finer
     }
     if (b.structure == "rigid" || !b.is_boom()) continue;
-    b.modes = b.directions == "all" ? b.modes + 4 * times : 2 * (b.modes + 2 * times);
+    if (b.basis.name == "clamped") {
+      b = with_more_of_each_kind(b, more, scene.bodies_kept_in, hooks);
+      continue;
+    }
+    b.modes = b.directions == "all" ? b.modes + 2 * more : 2 * (b.modes + more);
     b.directions = "all";
     b.shapes.clear();
   }
@@ -66,6 +133,16 @@ OutputTable without_coordinates(const OutputTable& table) {
 Scene with_stiffening(Scene scene) {
   for (BodyScene& b : scene.bodies)
     if (!b.rigid && b.structure != "rigid") b.stiffening = "on";
+  return scene;
+}
+
+Scene as_flown(Scene scene, const Run& run) {
+  for (BodyScene& b : scene.bodies) {
+    const auto body = std::ranges::find(run.bodies, b.name, [](const PreparedBody& p) { return p.body.name; });
+    if (b.stiffening != "auto" || body == run.bodies.end()) continue;
+    const auto index = static_cast<int>(body - run.bodies.begin());
+    b.stiffening = run.tree->stiffening(index) == Stiffening::off ? "off" : "on";
+  }
   return scene;
 }
 
@@ -183,7 +260,8 @@ std::vector<OutputDifference> change(const Run& run, const Scene& other, int ref
 
 /// The modes left out, first with few digits: more only where the answer would drown in the error of time integration.
 double truncation_error(const Run& run, const Scene& flown, const StillKinds& still, Measuring& m) {
-  Scene more = without_kinds(with_more_modes(flown), still, m.hooks);
+  constexpr int of_each_kind = 4;  // the next two alone may happen to do little
+  Scene more = without_kinds(with_more_modes(flown, of_each_kind, m.hooks), still, m.hooks);
   more.tolerance = std::max(flown.tolerance, 1e-5);
   std::vector<OutputDifference> differences = change(run, more, 0, m);
   if (more.tolerance != flown.tolerance && largest(differences) <= 10 * more.tolerance) {
@@ -191,17 +269,6 @@ double truncation_error(const Run& run, const Scene& flown, const StillKinds& st
     differences = change(run, more, 0, m);
   }
   return m.enter(&OutputErrors::truncation, differences);
-}
-
-/// The scene with the geometric stiffness that its run had: a repeat changes one thing alone.
-Scene as_flown(Scene scene, const Run& run) {
-  for (BodyScene& b : scene.bodies) {
-    const auto body = std::ranges::find(run.bodies, b.name, [](const PreparedBody& p) { return p.body.name; });
-    if (b.stiffening != "auto" || body == run.bodies.end()) continue;
-    const auto index = static_cast<int>(body - run.bodies.begin());
-    b.stiffening = run.tree->stiffening(index) == Stiffening::off ? "off" : "on";
-  }
-  return scene;
 }
 
 /// All that the scene leaves to the program.

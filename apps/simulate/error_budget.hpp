@@ -25,9 +25,17 @@ Scene without_kinds(Scene, const StillKinds&, const RunHooks&);
 ErrorBudget measure_budget(const Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan,
                            const StillKinds& still = {});
 
-/// Two more modes in each plane, so many times, and both planes: what bends out of the hinge plane is left out, too.
-/// Bodies from files get the modes that their files have beyond those kept.
-Scene with_more_modes(Scene, int times = 1);
+/// With as many modes as the elements have, `wanted` at most.
+BodyScene with_modes(BodyScene, int wanted, const std::filesystem::path& keep, const RunHooks&);
+
+/// Clamped bodies get the lowest modes that are left out: `more` of each kind that they have, half as many of others,
+/// for what bends out of the hinge plane is left out, too.
+/// Other bases get so many in each plane. Bodies from files get the modes that their files have beyond those kept.
+/// @throws InputError, NumericalError as prepare_body.
+Scene with_more_modes(Scene, int more, const RunHooks&);
+
+/// The scene with the geometric stiffness that its run had: a repeat changes one thing alone.
+Scene as_flown(Scene, const Run&);
 
 /// All geometric stiffness.
 Scene with_stiffening(Scene);

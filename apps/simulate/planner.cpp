@@ -24,26 +24,15 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double unmoved = 1e-10;  // of the largest displacement: round-off of one that is zero
-constexpr int fewest = 4;          // candidates per body
-constexpr int most_trials = 6;     // runs with fewer modes
-constexpr int most_rounds = 3;     // improvements
-constexpr int most_doublings = 2;  // of the candidates, where no budget shows what they leave out
+constexpr double unmoved = 1e-10;   // of the largest displacement: round-off of one that is zero
+constexpr int fewest = 4;           // candidates per body
+constexpr int for_budget = 8;       // modes beside the candidates that show their truncation
+constexpr int most_trials = 6;      // runs with fewer modes
+constexpr int most_rounds = 3;      // improvements
+constexpr int most_doublings = 2;   // of the candidates, before a budget shows what they leave out
+constexpr double nearly_all = 0.9;  // of the candidates: where so many are needed, more would be, too
 
 bool stopped(const RunHooks& hooks) { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
-
-/// With as many modes as the elements have, `wanted` at most.
-BodyScene with_modes(BodyScene b, int wanted, const std::filesystem::path& keep, const RunHooks& hooks) {
-  b.shapes.clear();
-  for (b.modes = wanted; b.modes > 2; b.modes -= 2) {
-    try {
-      prepared(b, 0, keep, hooks);
-      break;
-    } catch (const InputError&) {  // that is another fault where two modes have it, too
-    }
-  }
-  return b;
-}
 
 /// The largest |q| of every coordinate of a body.
 VectorXd amplitudes(const Run& run, const ReducedBody& body) {
@@ -68,14 +57,19 @@ Planner::Planner(const Scene& scene) {
     if (scene.bodies[i].modes_auto && scene.bodies[i].structure != "rigid") open_.push_back(i);
 }
 
-Scene Planner::with_candidates(const Scene& scene, int candidates, const RunHooks& hooks) const {
+Scene Planner::with_candidates(const Scene& scene, int candidates, int made, const RunHooks& hooks) const {
   Scene all = scene;
   for (const size_t i : open_) {
     BodyScene& b = all.bodies[i];
     b.modes_auto = false;
     b.open_directions();
-    const int wanted = b.directions == "all" ? candidates : candidates / 2;
-    b = with_modes(b, wanted, scene.bodies_kept_in, hooks);
+    const int share = b.directions == "all" ? 1 : 2, wanted = candidates / share;
+    int modes = wanted;
+    if (b.basis.name == "clamped") modes = made / share + (scene.error_budget ? for_budget : 0);
+    b = with_modes(b, modes, scene.bodies_kept_in, hooks);
+    if (b.modes <= wanted) continue;
+    b.shapes.resize(static_cast<size_t>(wanted));
+    std::iota(b.shapes.begin(), b.shapes.end(), 1);
   }
   return without_kinds(all, still_, hooks);
 }
@@ -131,14 +125,14 @@ Scene Planner::with_first(const Scene& all, const std::vector<Candidate>& list, 
 
 Run Planner::with_all(const Scene& scene, const RunHooks& hooks, Scene& open, Scene& all,
                       std::vector<std::string>& plan) {
+  const Run few = run_once(with_candidates(scene, fewest, candidates_, hooks), hooks);
   const auto run = [&](int candidates, long max_steps) {
-    open = with_candidates(scene, candidates, hooks);
-    all = with_stiffening(open);
+    open = with_candidates(scene, candidates, candidates, hooks);
+    all = as_flown(open, few);
     all.tolerance = std::max(scene.tolerance / 10, 1e-13);  // its errors are no part of the differences
     return run_once(all, hooks, 0, max_steps);
   };
-  const Run few = run(fewest, 0);
-  const long bearable = bearable_steps(few);
+  const long bearable = 2 * bearable_steps(few);  // of a tighter tolerance
   for (; candidates_ > fewest && !stopped(hooks); candidates_ /= 2) {
     try {
       return run(candidates_, bearable);
@@ -155,24 +149,27 @@ void Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::strin
   if (open_.empty()) return;
   const Scene given = scene;
   std::vector<std::string> words;
-  // The budget shows what the candidates leave out. Without it they are enough where fewer of them are.
+  // The budget shows what the candidates leave out, unless that is clear before. Without it they are enough where fewer
+  // of them are.
   for (int step = 0;; ++step) {
     scene = given, words.clear();
-    const bool all_needed = choose_among_candidates(scene, hooks, words);
+    const double needed = choose_among_candidates(scene, hooks, words);
     plan.insert(plan.end(), words.begin(), words.end());
-    if (given.error_budget || !all_needed || stopped(hooks)) return;
+    if (needed < (given.error_budget ? nearly_all : 1) || stopped(hooks)) return;
     if (step == most_doublings || costly_) break;
     candidates_ *= 2;
     plan.push_back(
-        fmt::format("modes: all that move are needed; they are chosen again, from {} of each body", candidates_));
+        fmt::format("modes: {:.0f} % of those that move are needed; they are chosen again, from {} of each body",
+                    100 * needed, candidates_));
   }
+  if (given.error_budget) return;
   scene.warnings.push_back(
       fmt::format("the modes may be too few for {:.1e}: all of the {} of each body that move are needed, and the error "
                   "budget is off",
                   scene.tolerance, candidates_));
 }
 
-bool Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
+double Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
   Scene open, all;
   const Run reference = with_all(scene, hooks, open, all, plan);
   const OutputTable wanted = without_coordinates(reference.outputs);
@@ -204,7 +201,8 @@ bool Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::
   };
   size_t enough = moved, too_few = 0, next = moving_by(scene.tolerance / 10);
   double error = 0;
-  for (int i = 0; i < most_trials && enough > too_few && !stopped(hooks); ++i) {
+  const auto is_settled = [&] { return enough <= too_few + enough / 16; };  // a trial costs more than these would save
+  for (int i = 0; i < most_trials && !is_settled() && !stopped(hooks); ++i) {
     const size_t count = std::min(next, enough - 1);
     const double e = error_with(count);
     const bool is_enough = e <= scene.tolerance / 3;
@@ -228,15 +226,17 @@ bool Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::
     std::vector<std::string> taken, small, still;
     for (size_t k = 0; k < list.size(); ++k)
       if (list[k].body == b.name) (k < enough ? taken : k < moved ? small : still).push_back(list[k].kind);
+    const auto known_still = still_.find(b.name);  // by earlier candidates, where these have none of the kind
+    const bool fewer_kinds = known_still != still_.end() && std::ranges::none_of(list, [&](const Candidate& c) {
+                               return c.body == b.name && known_still->second.contains(c.kind);
+                             });
     plan.push_back(fmt::format(
         "modes of {}: {}, of {} modes; left out: {} that nothing moves, {} that change the outputs "
         "by {:.1e} together with those of all bodies{}",
         b.name, counted(taken), taken.size() + small.size() + still.size(), counted(still), counted(small), error,
-        all.bodies[i].shapes.empty() && all.bodies[i].modes > 0
-            ? ""
-            : fmt::format("; no more of {}, which nothing moved", fmt::join(still_.at(b.name), ", "))));
+        fewer_kinds ? fmt::format("; no more of {}, which nothing moved", fmt::join(known_still->second, ", ")) : ""));
   }
-  return moved > 0 && enough == moved;
+  return moved > 0 ? static_cast<double>(enough) / static_cast<double>(moved) : 0;
 }
 
 bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {

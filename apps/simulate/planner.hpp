@@ -37,11 +37,12 @@ class Planner {
     double displacement = 0;  // the largest of any point at any time [m]
   };
 
-  /// Are all of them that move needed?
-  bool choose_among_candidates(Scene&, const RunHooks&, std::vector<std::string>& plan);
-  Scene with_candidates(const Scene&, int candidates, const RunHooks&) const;
+  /// Which part of those that move is needed?
+  double choose_among_candidates(Scene&, const RunHooks&, std::vector<std::string>& plan);
+  /// Clamped bodies take theirs from so many that are `made`, and some for the budget: once for all runs.
+  Scene with_candidates(const Scene&, int candidates, int made, const RunHooks&) const;
   /// The run that the others are compared with, as precise as that takes: as many candidates as are bearable. `open`
-  /// has them and leaves stiffening as it was, `all` is what was run.
+  /// has them and leaves stiffening open, `all` has what was run.
   Run with_all(const Scene&, const RunHooks&, Scene& open, Scene& all, std::vector<std::string>& plan);
   bool has_choice(const Scene&, const std::string& body) const;
   std::vector<Candidate> ranked(const Scene&, const Run&) const;

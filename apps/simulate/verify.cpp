@@ -37,12 +37,12 @@ struct Reference {
   bool other_basis = false;
 };
 
-std::vector<Reference> references(const Scene& scene, const std::string& used) {
-  constexpr int more_orders = 4, more_modes = 3;  // times two in each plane
-  const Scene modes = with_more_modes(scene, more_modes);
+std::vector<Reference> references(const Scene& scene, const std::string& used, const RunHooks& hooks) {
+  constexpr int more_orders = 4, more_modes = 6;
+  const Scene modes = with_more_modes(scene, more_modes, hooks);
   return {{"time: another method", by_another_method(scene, used)},
           {"time: the other formulation", in_the_other_formulation(scene)},
-          {"truncation: six more modes in each plane", modes, 0, true},
+          {"truncation: six more modes of each kind", modes, 0, true},
           {"discretisation: elements of four orders more", scene, more_orders, true},
           {"linearisation: all geometric stiffness", with_stiffening(scene), 0, true},
           {"all at once", by_another_method(with_stiffening(modes), used), more_orders, true}};
@@ -57,7 +57,7 @@ std::vector<ReferenceCheck> reference_checks(const RunResult& r, const RunHooks&
   RunHooks quiet;
   quiet.interrupt = hooks.interrupt, quiet.bodies = hooks.bodies;
   std::vector<ReferenceCheck> checks;
-  for (const Reference& reference : references(scene, r.trajectory.summary.method)) {
+  for (const Reference& reference : references(scene, r.trajectory.summary.method, quiet)) {
     if (hooks.interrupt != nullptr && hooks.interrupt->load()) break;
     ReferenceCheck check;
     check.what = reference.what;
