@@ -97,16 +97,15 @@ std::vector<Planner::Candidate> Planner::ranked(const Scene& scene, const Run& r
 }
 
 void Planner::note_still(const std::vector<Candidate>& list) {
-  constexpr int enough = 2;                                                     // one may stand still by chance
-  std::map<std::pair<std::string, std::string>, std::pair<int, double>> kinds;  // number, largest displacement
-  for (const Candidate& c : list) {
-    auto& [count, largest] = kinds[{c.body, c.kind}];
-    ++count, largest = std::max(largest, c.displacement);
-  }
   if (list.empty() || !(list.front().displacement > 0)) return;
-  for (const auto& [of, seen] : kinds)
-    if (seen.first >= enough && seen.second <= unmoved * list.front().displacement && of.second != "other")
-      still_[of.first].insert(of.second);
+  std::map<std::pair<std::string, std::string>, double> largest;  // displacement of a kind of a body
+  for (const Candidate& c : list) {
+    double& most = largest[{c.body, c.kind}];
+    most = std::max(most, c.displacement);
+  }
+  // One is evidence enough: the first mode of a kind takes part in any motion of the root that reaches others.
+  for (const auto& [of, most] : largest)
+    if (most <= unmoved * list.front().displacement && of.second != "other") still_[of.first].insert(of.second);
 }
 
 Scene Planner::with_first(const Scene& all, const std::vector<Candidate>& list, size_t count) const {

@@ -12,6 +12,8 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr double of_energy = 1e-4;  // of the values that an energy could give a state
+
 const ReducedBody& carried_body(const Tree& tree, size_t joint) {
   return tree.scene().bodies[static_cast<size_t>(tree.scene().joints[joint].b.body)];
 }
@@ -40,6 +42,7 @@ ErrorScales::ErrorScales(const Tree& tree, const VectorXd& y0, double tolerance,
 
 void ErrorScales::observe(const VectorXd& y) {
   own_ = own_.cwiseMax(y.cwiseAbs());
+  if (highest_floor_.size() > 0) raise_floors(y);
   for_each_size(y, [&](int i, double size) {
     if (size <= largest_[i]) return;
     largest_[i] = size;
@@ -65,6 +68,31 @@ void ErrorScales::restart(const VectorXd& y) {
   largest_.head(motion).setZero(), own_.head(motion).setZero();
   error_.scale.head(motion) = floor_.head(motion) * 1e-50;
   observe(y);
+}
+
+/// To a part of what each elastic coordinate would be, had it the energy of the one that has had the most.
+void ErrorScales::raise_floors(const VectorXd& y) {
+  const TreeLayout& l = tree_.layout();
+  double most = 0;  // twice that energy
+  for (size_t b = 0; b < l.q.size(); ++b) {
+    const ReducedBody& body = tree_.scene().bodies[b];
+    const auto q = y.segment(l.q[b], body.n()), q_dot = y.segment(l.rate(l.q[b]), body.n());
+    for (int k = 0; k < body.n(); ++k)
+      most = std::max(most, body.Ke(k, k) * q[k] * q[k] + body.Me(k, k) * q_dot[k] * q_dot[k]);
+  }
+  if (most <= most_held_) return;
+  most_held_ = most;
+  const auto raise_to = [&](int i, double size) {
+    floor_[i] = std::max(floor_[i], std::min(of_energy * size, highest_floor_[i]));
+    error_.scale[i] = std::max(error_.scale[i], floor_[i]);
+  };
+  for (size_t b = 0; b < l.q.size(); ++b) {
+    const ReducedBody& body = tree_.scene().bodies[b];
+    for (int k = 0; k < body.n(); ++k) {
+      if (body.Ke(k, k) > 0) raise_to(l.q[b] + k, std::sqrt(most / body.Ke(k, k)));
+      raise_to(l.rate(l.q[b] + k), std::sqrt(most / body.Me(k, k)));
+    }
+  }
 }
 
 /// each(i, size) for every state.
@@ -115,9 +143,10 @@ void ErrorScales::for_each_size(const VectorXd& y, const Each& each) const {
 }
 
 /// A small part of the body's size (lengths, deflections), of a radian, and of these in the time that they take; or of
-/// the values that all the energy at the start could give each state, where that is less.
+/// the values that all the energy at the start could give each state, where that is less. Without energy at the start,
+/// elastic coordinates begin with a thousandth of that: a stiff one of the same size has far more energy than others.
 void ErrorScales::set_floors(const VectorXd& y0) {
-  constexpr double of_size = 1e-5, of_energy = 1e-4;
+  constexpr double of_size = 1e-5, at_first = 1e-3;
   const TreeLayout& l = tree_.layout();
   const Multibody& scene = tree_.scene();
   double length = 0;
@@ -172,6 +201,13 @@ void ErrorScales::set_floors(const VectorXd& y0) {
       for (int k = 0; k < 3; ++k)
         limit(j.omega + k, turn), limit(j.velocity + k, v), limit(j.position + k, v * longest);
       for (int k = 0; k < 4; ++k) limit(j.attitude + k, std::min(1.0, turn * longest));
+    }
+  }
+  if (!(energy > 1e-30)) {
+    highest_floor_ = floor_;
+    for (size_t b = 0; b < l.q.size(); ++b) {
+      floor_.segment(l.q[b], scene.bodies[b].n()) *= at_first;
+      floor_.segment(l.rate(l.q[b]), scene.bodies[b].n()) *= at_first;
     }
   }
   for (const TreeLayout::Joint& j : l.joints)

@@ -35,6 +35,7 @@ class ErrorScales {
   template <class Each>
   void for_each_size(const Eigen::VectorXd& y, const Each& each) const;
   void set_floors(const Eigen::VectorXd& y0);
+  void raise_floors(const Eigen::VectorXd& y);
 
   const Tree& tree_;
   bool rescale_;
@@ -42,6 +43,8 @@ class ErrorScales {
   std::vector<double> period_;                   // per joint, on its spring and stop, over 2 pi [s]; 0: it has none
   Eigen::VectorXd floor_, bound_, largest_;      // bound: what the energy at the start could make; 0: it says nothing
   Eigen::VectorXd own_;                          // largest |y| of each state
+  Eigen::VectorXd highest_floor_;  // where the start has no energy: of the elastic coordinates; else empty
+  double most_held_ = 0;           // then: twice the largest energy of one of them so far
   ErrorScale error_;
 };
 
