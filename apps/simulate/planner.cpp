@@ -2,7 +2,6 @@
 
 #include "apps/simulate/planner.hpp"
 
-#include "apps/base/deflection.hpp"
 #include "apps/simulate/error_budget.hpp"
 #include "fem/base/check.hpp"
 #include "fem/booms/solid_boom.hpp"
@@ -24,13 +23,13 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double unmoved = 1e-10;   // of the largest displacement: round-off of one that is zero
-constexpr int fewest = 4;           // candidates per body
-constexpr int for_budget = 8;       // modes beside the candidates that show their truncation
-constexpr int most_trials = 6;      // runs with fewer modes
-constexpr int most_rounds = 3;      // improvements
-constexpr int most_doublings = 2;   // of the candidates, before a budget shows what they leave out
-constexpr double nearly_all = 0.9;  // of the candidates: where so many are needed, more would be, too
+constexpr double unmoved = 1e-10;    // of the largest displacement: round-off of one that is zero
+constexpr int fewest = 4;            // candidates per body
+constexpr int for_budget = 8;        // modes beside the candidates that show their truncation
+constexpr int most_trials = 6;       // runs with fewer modes
+constexpr int most_rounds = 3;       // improvements
+constexpr int most_doublings = 2;    // of the candidates, before a budget shows what they leave out
+constexpr double nearly_all = 0.85;  // of the candidates: where so many are needed, more would be, too
 
 bool stopped(const RunHooks& hooks) { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
 
@@ -85,12 +84,10 @@ std::vector<Planner::Candidate> Planner::ranked(const Scene& scene, const Run& r
   std::vector<Candidate> list;
   for (const PreparedBody& p : run.bodies) {
     if (p.body.n() == 0 || !has_choice(scene, p.body.name)) continue;
-    const Deflection deflection(p.body);
     const VectorXd q = amplitudes(run, p.body);
     for (int k = 0; k < p.body.n(); ++k)
       list.push_back({p.body.name, p.shapes.empty() ? k + 1 : p.shapes[static_cast<size_t>(k)],
-                      p.body.coordinates[static_cast<size_t>(k)].kind,
-                      deflection.largest(q[k] * VectorXd::Unit(p.body.n(), k))});
+                      p.body.coordinates[static_cast<size_t>(k)].kind, q[k] * std::sqrt(p.body.Me(k, k) / p.body.m)});
   }
   std::ranges::stable_sort(list, std::greater(), &Candidate::displacement);
   return list;

@@ -34,7 +34,7 @@ class Planner {
     std::string body;
     int shape = 0;  // as BodyScene::shapes
     std::string kind;
-    double displacement = 0;  // the largest of any point at any time [m]
+    double displacement = 0;  // the largest at any time, root of its mean square over the mass: torsion counts, too [m]
   };
 
   /// Which part of those that move is needed?
