@@ -24,11 +24,13 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double unmoved = 1e-10;    // of the largest displacement: round-off of one that is zero
+constexpr int most_candidates = 96;  // per body
 constexpr int fewest = 4;            // candidates per body
 constexpr int for_budget = 8;        // modes beside the candidates that show their truncation
 constexpr int most_trials = 6;       // runs with fewer modes
 constexpr int most_rounds = 3;       // improvements
-constexpr int most_doublings = 2;    // of the candidates, before a budget shows what they leave out
+constexpr double not_near = 10;    // times the tolerance: of the most modes that are not enough, where errors converge
+constexpr int most_doublings = 2;  // of the candidates, before a budget shows what they leave out
 constexpr double nearly_all = 0.85;  // of the candidates: where so many are needed, more would be, too
 
 bool stopped(const RunHooks& hooks) { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
@@ -149,14 +151,16 @@ void Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::strin
   // of them are.
   for (int step = 0;; ++step) {
     scene = given, words.clear();
-    const double needed = choose_among_candidates(scene, hooks, words);
+    const Choice choice = choose_among_candidates(scene, hooks, words);
     plan.insert(plan.end(), words.begin(), words.end());
-    if (needed < (given.error_budget ? nearly_all : 1) || stopped(hooks)) return;
-    if (step == most_doublings || costly_) break;
+    const bool is_enough = choice.needed < (given.error_budget ? nearly_all : 1);
+    hopeless_ = given.error_budget && !is_enough && choice.error_of_fewer > not_near * scene.tolerance;
+    if (is_enough || stopped(hooks)) return;
+    if (step == most_doublings || costly_ || hopeless_ || 2 * candidates_ > most_candidates) break;
     candidates_ *= 2;
     plan.push_back(
         fmt::format("modes: {:.0f} % of those that move are needed; they are chosen again, from {} of each body",
-                    100 * needed, candidates_));
+                    100 * choice.needed, candidates_));
   }
   if (given.error_budget) return;
   scene.warnings.push_back(
@@ -165,7 +169,7 @@ void Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::strin
                   scene.tolerance, candidates_));
 }
 
-double Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
+Planner::Choice Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
   Scene open, all;
   const Run reference = with_all(scene, hooks, open, all, plan);
   const OutputTable wanted = without_coordinates(reference.outputs);
@@ -196,7 +200,7 @@ double Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std
     return count;
   };
   size_t enough = moved, too_few = 0, next = moving_by(scene.tolerance / 10);
-  double error = 0;
+  double error = 0, error_of_fewer = 0;
   const auto is_settled = [&] { return enough <= too_few + enough / 16; };  // a trial costs more than these would save
   for (int i = 0; i < most_trials && !is_settled() && !stopped(hooks); ++i) {
     const size_t count = std::min(next, enough - 1);
@@ -205,7 +209,7 @@ double Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std
     if (is_enough)
       enough = count, error = e;
     else
-      too_few = count + 1;
+      too_few = count + 1, error_of_fewer = e;
     next = expected(count, e);
     if (is_enough && next >= enough) break;
     const bool has_failed_before = !is_enough && i > 0;  // then the proportion does not hold
@@ -232,7 +236,7 @@ double Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std
         b.name, counted(taken), taken.size() + small.size() + still.size(), counted(still), counted(small), error,
         fewer_kinds ? fmt::format("; no more of {}, which nothing moved", fmt::join(known_still->second, ", ")) : ""));
   }
-  return moved > 0 ? static_cast<double>(enough) / static_cast<double>(moved) : 0;
+  return {moved > 0 ? static_cast<double>(enough) / static_cast<double>(moved) : 0, error_of_fewer};
 }
 
 bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {
@@ -246,8 +250,8 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
   if (worst->known() <= scene.tolerance || std::max(truncation, discretisation) <= others) return false;
   if (truncation >= discretisation) {
     const double before = std::exchange(truncation_, worst->truncation);
-    constexpr double far = 100;
-    if (costly_ || (truncation_ > far * scene.tolerance && truncation_ > before / 2)) return false;
+    const bool hardly_changes = hopeless_ || truncation_ > before / 2;
+    if (costly_ || hardly_changes || 2 * candidates_ > most_candidates) return false;
     candidates_ *= 2;
     plan.push_back(fmt::format("truncation: {:.1e} in {}; modes are chosen again, from {} of each body",
                                worst->truncation, worst->name, candidates_));

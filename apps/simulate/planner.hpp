@@ -37,8 +37,11 @@ class Planner {
     double displacement = 0;  // the largest at any time, root of its mean square over the mass: torsion counts, too [m]
   };
 
-  /// Which part of those that move is needed?
-  double choose_among_candidates(Scene&, const RunHooks&, std::vector<std::string>& plan);
+  struct Choice {
+    double needed = 0;          // part of those that move
+    double error_of_fewer = 0;  // of the most that are not enough
+  };
+  Choice choose_among_candidates(Scene&, const RunHooks&, std::vector<std::string>& plan);
   /// Clamped bodies take theirs from so many that are `made`, and some for the budget: once for all runs.
   Scene with_candidates(const Scene&, int candidates, int made, const RunHooks&) const;
   /// The run that the others are compared with, as precise as that takes: as many candidates as are bearable. `open`
@@ -54,6 +57,7 @@ class Planner {
   int steps_ = 0;             // improvements so far
   StillKinds still_;
   bool costly_ = false;          // more candidates are not bearable
+  bool hopeless_ = false;        // nearly all are needed, and without the last of them errors are far too large
   double truncation_ = unknown;  // of the last step
 };
 
