@@ -222,8 +222,8 @@ struct Measuring {
   }
 };
 
-/// Repeats the run ten times tighter until the difference is within half of the tolerance, for there are other errors;
-/// the tighter run then takes its place. Returns the difference. `flown` is the scene of the run that was kept.
+/// Repeats the run ten times tighter until the difference is within a third of the tolerance, for there are other
+/// errors; the tighter run then takes its place. Returns the difference. `flown` is the scene of the run that was kept.
 double settle_time_error(const Scene& scene, Scene& flown, Run& run, Measuring& m) {
   constexpr int most = 3;
   for (int i = 1;; ++i) {
@@ -233,7 +233,7 @@ double settle_time_error(const Scene& scene, Scene& flown, Run& run, Measuring& 
     const std::vector<OutputDifference> differences =
         compare_outputs(run.outputs, finer.outputs, scene.outputs, m.floors);
     const double error = largest(differences);
-    if (error <= scene.tolerance / 2 || i == most || m.stopped() || tight.tolerance < 1e-13)
+    if (error <= scene.tolerance / 3 || i == most || m.stopped() || tight.tolerance < 1e-13)
       return m.enter(&OutputErrors::time, differences);
     run = std::move(finer);
     flown = tight;

@@ -199,7 +199,8 @@ Planner::Choice Planner::choose_among_candidates(Scene& scene, const RunHooks& h
     while (count > 0 && left_out(count - 1) * tried_error <= left_out(tried) * scene.tolerance / 3) --count;
     return count;
   };
-  size_t enough = moved, too_few = 0, next = moving_by(scene.tolerance / 10);
+  size_t enough = moved, too_few = std::min(too_few_, moved), next = moving_by(scene.tolerance / 10);
+  if (too_few > 0) next = too_few + too_few / 8;
   double error = 0, error_of_fewer = 0;
   const auto is_settled = [&] { return enough <= too_few + enough / 16; };  // a trial costs more than these would save
   for (int i = 0; i < most_trials && !is_settled() && !stopped(hooks); ++i) {
@@ -215,6 +216,7 @@ Planner::Choice Planner::choose_among_candidates(Scene& scene, const RunHooks& h
     const bool has_failed_before = !is_enough && i > 0;  // then the proportion does not hold
     if (has_failed_before || next < too_few || next >= enough) next = (enough + too_few) / 2;
   }
+  kept_ = enough;
   const Scene chosen = with_first(open, list, enough);
   for (const size_t i : open_) {
     const BodyScene& b = scene.bodies[i] = chosen.bodies[i];
@@ -251,8 +253,9 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
   if (truncation >= discretisation) {
     const double before = std::exchange(truncation_, worst->truncation);
     const bool hardly_changes = hopeless_ || truncation_ > before / 2;
-    if (costly_ || hardly_changes || 2 * candidates_ > most_candidates) return false;
-    candidates_ *= 2;
+    if (costly_ || hardly_changes || candidates_ >= most_candidates) return false;
+    candidates_ = std::min(candidates_ + candidates_ / 2, most_candidates);
+    too_few_ = kept_ + 1;
     plan.push_back(fmt::format("truncation: {:.1e} in {}; modes are chosen again, from {} of each body",
                                worst->truncation, worst->name, candidates_));
     const Scene fewer = scene;

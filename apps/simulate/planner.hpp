@@ -20,7 +20,7 @@ class Planner {
   /// @throws InputError, NumericalError as run_once, of the candidates.
   void choose(Scene&, const RunHooks&, std::vector<std::string>& plan);
 
-  /// A better model where the largest part of the budget's worst output is truncation (twice the candidates) or
+  /// A better model where the largest part of the budget's worst output is truncation (more candidates) or
   /// discretisation (finer elements). False: the budget is met, or what stops it is not for a plan to mend: another
   /// part, or a truncation that more modes hardly change.
   bool improve(Scene&, const ErrorBudget&, const RunHooks&, std::vector<std::string>& plan);
@@ -55,6 +55,8 @@ class Planner {
   std::vector<size_t> open_;  // bodies of the scene
   int candidates_ = 12;       // per body
   int steps_ = 0;             // improvements so far
+  size_t kept_ = 0;           // modes of all bodies, of the last choice
+  size_t too_few_ = 0;        // at least so many are needed, as a budget has shown
   StillKinds still_;
   bool costly_ = false;          // more candidates are not bearable
   bool hopeless_ = false;        // nearly all are needed, and without the last of them errors are far too large
