@@ -66,9 +66,10 @@ class Arkode {
   /// One step, to t_end at most. Returns where it ends.
   double step(double t_end) {
     check(ARKStepSetStopTime(arkode_, t_end), "ARKStepSetStopTime");
-    realtype reached = t_end;
+    realtype start = 0, reached = t_end;
+    check(ARKStepGetCurrentTime(arkode_, &start), "ARKStepGetCurrentTime");
     const int flag = ARKStepEvolve(arkode_, t_end, y_.get(), &reached, ARK_ONE_STEP);
-    problem_.rethrow();
+    problem_.rethrow(flag, start, reached);
     check(flag, "ARKStepEvolve");
     return reached;
   }

@@ -52,7 +52,7 @@ class CvodeStepper final : public Stepper {
     realtype reached = t;
     crossings_.begin(problem_, start, y.data());
     const int flag = CVode(cvode_, t_end, y_.get(), &reached, CV_ONE_STEP);
-    problem_.rethrow();
+    problem_.rethrow(flag, start, reached);
     check(flag, "CVode");
     const double length = reached - start;
     between_.resize(y.size());

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <functional>
 #include <limits>
 #include <map>
@@ -76,24 +77,32 @@ class ExponentialStepper final : public Stepper {
   void step(double t_end, double& t, VectorXd& y, std::span<int> crossed) override {
     std::ranges::fill(crossed, 0);
     if (pending_) advance_start();
+    std::exception_ptr unfit;
     for (int failures = 0;; ++failures) {
       const double left = t_end - step_.start;
       const bool last = h_ >= left * (1 - 1e-12);
       step_.length = last ? left : h_;
       if (last) step_.linear->grid(step_.length, spare_);
       step_.grid = last ? &spare_ : &step_.linear->kept_grid(step_.length);
-      const double error = solve(left);
+      double error = std::numeric_limits<double>::infinity();
+      try {
+        error = solve(left);
+      } catch (const UnfitState&) {  // points that do not stand still may be anywhere
+        unfit = std::current_exception();
+      }
       if (error <= 1) {
         ++counts_.steps;
         choose_step(error, last);
         break;
       }
       ++counts_.error_test_failures;
-      if (!(step_.length > 1e-14 * std::max(1.0, std::abs(step_.start))))
+      if (!(step_.length > 1e-14 * std::max(1.0, std::abs(step_.start)))) {
+        if (unfit) std::rethrow_exception(unfit);
         throw MethodFailure(
             fmt::format("exponential: no step is small enough at t = {:.9g} s; eigenvalues reach {:.2g} 1/s, whose "
                         "round-off may be more than the tolerance: fewer modes, or a coarser one",
                         step_.start, step_.linear->lambda.cwiseAbs().maxCoeff()));
+      }
       h_ = std::isfinite(error) ? smaller(error) : on_ladder(step_.length / (rung * rung));
       if (!std::isfinite(error)) relinearise(failures < 6 ? 1e-3 : 1e-9);
     }

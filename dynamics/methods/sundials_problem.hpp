@@ -38,8 +38,9 @@ class Problem {
   void set_contacts(std::span<const char> contact) { contact_.assign(contact.begin(), contact.end()); }
   std::span<const char> contacts() const { return contact_; }
 
-  /// What a function below has caught, thrown on: SUNDIALS is C.
-  void rethrow();
+  /// What a function below has caught in the step from a time to another, thrown on: SUNDIALS is C. A shorter step may
+  /// have found its way (flag >= 0); one that gets nowhere has not.
+  void rethrow(int flag, double from, double to);
 
   static int derivative(realtype t, N_Vector y, N_Vector y_dot, void* problem) noexcept;
   static int weights(N_Vector y, N_Vector weight, void* problem) noexcept;

@@ -10,4 +10,10 @@ class MethodFailure : public NumericalError {
   using NumericalError::NumericalError;
 };
 
+/// A state at which the equations have no answer. Of a trial within a step a shorter step may know better.
+class UnfitState : public NumericalError {
+ public:
+  using NumericalError::NumericalError;
+};
+
 }  // namespace flexboom

@@ -2,6 +2,7 @@
 
 #include "dynamics/model/load_values.hpp"
 #include "dynamics/numerics/inner_loop.hpp"
+#include "dynamics/numerics/method_failure.hpp"
 #include "dynamics/relative/impl.hpp"
 #include "fem/base/check.hpp"
 
@@ -145,14 +146,14 @@ bool is_sound(const tree::Model& model, const tree::Scratch<double>& scratch) {
   return sound;
 }
 
-/// @throws NumericalError naming the first body, from the tips inwards, whose mass matrix is singular or indefinite.
+/// @throws UnfitState naming the first body, from the tips inwards, whose mass matrix is singular or indefinite.
 void report_mass(const tree::Model& model, double t, const VectorXd& y, std::span<const char> contact,
                  std::span<const LawBranch> laws) {
   if (!y.allFinite()) return;
   const tree::Scratch<double> scratch = tree::link_by_link(model, t, y, contact, laws);
   for (size_t i = model.links.size(); i-- > 0;) {
     const std::string fault = mass_fault(*model.scene, model.links[i], scratch.links[i]);
-    if (!fault.empty()) throw NumericalError(fmt::format("t = {:.9g} s: {}", t, fault));
+    if (!fault.empty()) throw UnfitState(fmt::format("t = {:.9g} s: {}", t, fault));
   }
 }
 

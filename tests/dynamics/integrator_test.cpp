@@ -1,3 +1,6 @@
+#include "dynamics/methods/error_scales.hpp"
+#include "dynamics/methods/ode.hpp"
+#include "dynamics/relative/split.hpp"
 #include "dynamics/simulation/tree_integrator.hpp"
 
 #include "fem/base/check.hpp"
@@ -39,6 +42,89 @@ Hub boom_2(int modes, double zeta = 0) {
   Hinge hinge;
   hinge.mechanism = testing::sport_mechanism(0.35);
   return Hub({}, {{body, hinge}});
+}
+
+/// Equations that have no answer, `left` times, after a time.
+struct Unfit {
+  double after = 0;
+  int left = 0;
+
+  void look(double t) {
+    if (t > after && left-- > 0) throw UnfitState("no answer here");
+  }
+};
+
+class UnfitOde final : public Ode {
+ public:
+  UnfitOde(std::unique_ptr<Ode> ode, Unfit& unfit) : ode_(std::move(ode)), unfit_(unfit) {}
+  std::unique_ptr<Ode> another() const override { return ode_->another(); }
+  int size() const override { return ode_->size(); }
+  int stops() const override { return ode_->stops(); }
+  void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) override {
+    unfit_.look(t);
+    ode_->derivative(t, y, contact, y_dot);
+  }
+  void jacobian(double t, const double* y, std::span<const char> contact) override { ode_->jacobian(t, y, contact); }
+  void factorise(double gamma) override { ode_->factorise(gamma); }
+  void solve(const double* b, double* x) override { ode_->solve(b, x); }
+  double gap(const double* y, int stop) const override { return ode_->gap(y, stop); }
+  double gap_rate(const double* y, int stop) const override { return ode_->gap_rate(y, stop); }
+
+ private:
+  std::unique_ptr<Ode> ode_;
+  Unfit& unfit_;
+};
+
+class UnfitSplit final : public SplitProblem {
+ public:
+  UnfitSplit(std::unique_ptr<SplitProblem> problem, Unfit& unfit) : problem_(std::move(problem)), unfit_(unfit) {}
+  const SplitLayout& layout() const override { return problem_->layout(); }
+  void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) override {
+    unfit_.look(t);
+    problem_->derivative(t, y, contact, y_dot);
+  }
+  Vector3d outside_acceleration(size_t root, double t, const double* y) override {
+    return problem_->outside_acceleration(root, t, y);
+  }
+  Eigen::MatrixXd linear(double t, const double* y, std::span<const char> contact, int first, int count) override {
+    return problem_->linear(t, y, contact, first, count);
+  }
+  FloatingBodies floating(size_t root, double t, const double* y) override { return problem_->floating(root, t, y); }
+  MassCentre mass_centre(size_t root, double t, const double* y) override { return problem_->mass_centre(root, t, y); }
+
+ private:
+  std::unique_ptr<SplitProblem> problem_;
+  Unfit& unfit_;
+};
+
+/// A flight of boom 2 to 0.02 s, before its stop.
+VectorXd swung(const std::string& name, Unfit& unfit) {
+  const Hub system = boom_2(2);
+  const Tree& tree = system.tree();
+  VectorXd y = system.pack(system.at_rest({0.8}));
+  ErrorScales scales(tree, y, 1e-9);
+  const Laws laws(tree.scene().joints, {});
+  const auto method = std::ranges::find(integrator_methods(), name, &IntegratorMethod::name);
+  const std::unique_ptr<Stepper> stepper =
+      method->make_split != nullptr
+          ? method->make_split(std::make_unique<UnfitSplit>(split(tree), unfit), scales.error())
+          : method->make(std::make_unique<UnfitOde>(ode_of(tree, laws), unfit), scales.error());
+  std::vector<char> contact(tree.stops().size(), 0), armed(contact);
+  std::vector<int> crossed(contact.size());
+  double t = 0;
+  for (stepper->restart(t, y, contact, armed); t < 0.02;) stepper->step(0.02, t, y, crossed);
+  return y;
+}
+
+// Within a step a method may try a state that the motion never comes to. Explicit stages of ARKODE have no second try.
+TEST_P(EveryMethod, TriesAShorterStepWhereATrialHasNoAnswer) {
+  Unfit never, twice{.after = 0.01, .left = 2}, always{.after = 0.01, .left = 1 << 30};
+  const VectorXd expected = swung(GetParam(), never);
+  EXPECT_THROW(swung(GetParam(), always), UnfitState);
+  if (GetParam() == "erk") return;
+  const VectorXd y = swung(GetParam(), twice);
+  EXPECT_LT(twice.left, 0);
+  EXPECT_LT((y - expected).norm(), 1e-6 * expected.norm());
 }
 
 /// Every contact and release over 10 s keeps its digits, down to motions of 1e-45 rad.
