@@ -260,8 +260,7 @@ std::vector<OutputDifference> change(const Run& run, const Scene& other, int ref
 
 /// The modes left out, first with few digits: more only where the answer would drown in the error of time integration.
 double truncation_error(const Run& run, const Scene& flown, const StillKinds& still, Measuring& m) {
-  constexpr int of_each_kind = 4;  // the next two alone may happen to do little
-  Scene more = without_kinds(with_more_modes(flown, of_each_kind, m.hooks), still, m.hooks);
+  Scene more = without_kinds(with_more_modes(flown, modes_of_truncation, m.hooks), still, m.hooks);
   more.tolerance = std::max(flown.tolerance, 1e-5);
   std::vector<OutputDifference> differences = change(run, more, 0, m);
   if (more.tolerance != flown.tolerance && largest(differences) <= 10 * more.tolerance) {

@@ -28,6 +28,9 @@ ErrorBudget measure_budget(const Scene&, Run& run, const RunHooks&, std::vector<
 /// With as many modes as the elements have, `wanted` at most.
 BodyScene with_modes(BodyScene, int wanted, const std::filesystem::path& keep, const RunHooks&);
 
+/// So many of each kind show what a model leaves out: the next two alone may happen to do little.
+inline constexpr int modes_of_truncation = 4;
+
 /// Clamped bodies get the lowest modes that are left out: `more` of each kind that they have, half as many of others,
 /// for what bends out of the hinge plane is left out, too.
 /// Other bases get so many in each plane. Bodies from files get the modes that their files have beyond those kept.

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <utility>
@@ -68,9 +69,13 @@ Scene Planner::with_candidates(const Scene& scene, int candidates, int made, con
     int modes = wanted;
     if (b.basis.name == "clamped") modes = made / share + (scene.error_budget ? for_budget : 0);
     b = with_modes(b, modes, scene.bodies_kept_in, hooks);
+    const auto shown = candidates < made ? shown_.end() : shown_.find(b.name);
+    if (shown != shown_.end()) b.modes = std::max(b.modes, shown->second.modes);
     if (b.modes <= wanted) continue;
     b.shapes.resize(static_cast<size_t>(wanted));
     std::iota(b.shapes.begin(), b.shapes.end(), 1);
+    if (shown == shown_.end()) continue;
+    std::ranges::copy_if(shown->second.shapes, std::back_inserter(b.shapes), [&](int k) { return k > wanted; });
   }
   return without_kinds(all, still_, hooks);
 }
@@ -105,6 +110,13 @@ void Planner::note_still(const std::vector<Candidate>& list) {
   // One is evidence enough: the first mode of a kind takes part in any motion of the root that reaches others.
   for (const auto& [of, most] : largest)
     if (most <= unmoved * list.front().displacement && of.second != "other") still_[of.first].insert(of.second);
+}
+
+void Planner::note_shown(const Scene& planned, const RunHooks& hooks) {
+  const Scene more = with_more_modes(planned, modes_of_truncation, hooks);
+  for (const size_t i : open_)
+    if (planned.bodies[i].basis.name == "clamped" && planned.bodies[i].directions == "all")
+      shown_[planned.bodies[i].name] = more.bodies[i];
 }
 
 Scene Planner::with_first(const Scene& all, const std::vector<Candidate>& list, size_t count) const {
@@ -255,6 +267,7 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
     const bool hardly_changes = hopeless_ || truncation_ > before / 2;
     if (costly_ || hardly_changes || candidates_ >= most_candidates) return false;
     candidates_ = std::min(candidates_ + candidates_ / 2, most_candidates);
+    note_shown(scene, hooks);
     too_few_ = kept_ + 1;
     plan.push_back(fmt::format("truncation: {:.1e} in {}; modes are chosen again, from {} of each body",
                                worst->truncation, worst->name, candidates_));

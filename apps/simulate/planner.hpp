@@ -3,6 +3,7 @@
 #include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/simulate.hpp"
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -52,11 +53,15 @@ class Planner {
   void note_still(const std::vector<Candidate>&);
   Scene with_first(const Scene& all, const std::vector<Candidate>&, size_t count) const;
 
-  std::vector<size_t> open_;  // bodies of the scene
-  int candidates_ = 12;       // per body
-  int steps_ = 0;             // improvements so far
-  size_t kept_ = 0;           // modes of all bodies, of the last choice
-  size_t too_few_ = 0;        // at least so many are needed, as a budget has shown
+  /// Modes beside those of the plan that have shown its truncation: candidates, too, from then on.
+  void note_shown(const Scene& planned, const RunHooks&);
+
+  std::vector<size_t> open_;                // bodies of the scene
+  std::map<std::string, BodyScene> shown_;  // with these modes
+  int candidates_ = 12;                     // per body
+  int steps_ = 0;                           // improvements so far
+  size_t kept_ = 0;                         // modes of all bodies, of the last choice
+  size_t too_few_ = 0;                      // at least so many are needed, as a budget has shown
   StillKinds still_;
   bool costly_ = false;          // more candidates are not bearable
   bool hopeless_ = false;        // nearly all are needed, and without the last of them errors are far too large
