@@ -290,9 +290,8 @@ bool beyond_a_hub(KeyReader& reader, const Scene& s) {
   return std::ranges::any_of(std::array{"joints", "springs", "loads", "wheels", "turns", "gravity"},
                              [&](const char* key) { return reader.has(key); }) ||
          std::ranges::any_of(s.hinges, [](const HingeScene& h) { return h.law.given(); }) ||
-         std::ranges::any_of(s.bodies, [](const BodyScene& b) {
-           return b.rigid || !b.reduced_file.empty() || b.root_moves();
-         });
+         std::ranges::any_of(s.bodies,
+                             [](const BodyScene& b) { return b.rigid || !b.reduced_file.empty() || b.root_moves(); });
 }
 
 }  // namespace

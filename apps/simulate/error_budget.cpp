@@ -25,17 +25,20 @@ std::map<std::string, int> kinds_of(const PreparedBody& p) {
   return kinds;
 }
 
-/// Where the modes of a body are among all that bend in either plane, twist or stretch it: `all` has them.
-std::vector<int> places_of(const PreparedBody& own, bool in_plane, const PreparedBody& all) {
-  if (!own.shapes.empty()) return own.shapes;
+/// Where the modes of a body are among all that bend in either plane, twist or stretch it. `whole` is the body with all
+/// shapes of its directions, `all` with those of all directions. The n-th of a kind here is the n-th of it there.
+std::vector<int> places_of(const BodyScene& b, const PreparedBody& whole, const PreparedBody& all) {
+  std::map<std::string, std::vector<int>> of_kind;
+  for (const Coordinate& c : all.body.coordinates)
+    of_kind[c.kind].push_back(static_cast<int>(&c - all.body.coordinates.data()) + 1);
+  std::map<std::string, size_t> count;
   std::vector<int> places;
-  if (!in_plane) {
-    for (int k = 1; k <= own.body.n(); ++k) places.push_back(k);
-    return places;
+  for (int k = 1; k <= whole.body.n(); ++k) {
+    const std::string& kind = whole.body.coordinates[static_cast<size_t>(k) - 1].kind;
+    const size_t n = count[kind]++;
+    const bool is_own = b.shapes.empty() || std::ranges::find(b.shapes, k) != b.shapes.end();
+    if (is_own && n < of_kind[kind].size()) places.push_back(of_kind[kind][n]);
   }
-  std::map<std::string, int> missing = kinds_of(own);
-  for (size_t k = 0; k < all.body.coordinates.size(); ++k)
-    if (missing[all.body.coordinates[k].kind]-- > 0) places.push_back(static_cast<int>(k) + 1);
   return places;
 }
 
@@ -44,15 +47,16 @@ BodyScene with_more_of_each_kind(const BodyScene& b, int more, const std::filesy
                                  const RunHooks& hooks) {
   constexpr int most_trials = 4;
   const bool in_plane = b.directions != "all";
-  const PreparedBody own = prepared(b, 0, keep, hooks);
   BodyScene richer = b;
+  richer.shapes.clear();
+  const PreparedBody own = prepared(b, 0, keep, hooks), whole = prepared(richer, 0, keep, hooks);
   richer.directions = "all";
   for (int i = 1;; ++i) {
-    const int highest = in_plane ? 2 * b.modes : own.shapes.empty() ? own.body.n() : own.shapes.back();
+    const int highest = in_plane ? 2 * b.modes : b.shapes.empty() ? b.modes : b.shapes.back();
     const int wanted = std::max(b.modes, highest + 2 * i * more);
     richer = with_modes(std::move(richer), wanted, keep, hooks);
     const PreparedBody all = prepared(richer, 0, keep, hooks);
-    const std::vector<int> places = places_of(own, in_plane, all);
+    const std::vector<int> places = places_of(b, whole, all);
     const std::map<std::string, int> kinds = kinds_of(own);
     std::map<std::string, int> beside;
     std::vector<int> shapes;
