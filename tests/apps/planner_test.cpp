@@ -116,6 +116,16 @@ TEST(Planner, AnOutputWithALooserAccuracyTakesFewerModes) {
   EXPECT_LE(largest(compare_outputs(loose.outputs, strict.outputs, {"boom.tip"})), 1e-2);
 }
 
+// The panel's root is beside the mass centre, so its reaction rolls the hub. Torsion then moves mass, but not the axis.
+TEST(Planner, TorsionThatTheRootExcitesIsKept) {
+  Scene scene = load_scene("flexible-appendage");
+  scene.bodies[1].modes_auto = true;
+  scene.tolerance = 1e-3;
+  const RunResult r = run_scene(scene, {});
+  EXPECT_GT(std::ranges::count(r.bodies[1].body.coordinates, "torsion", &Coordinate::kind), 0);
+  EXPECT_TRUE(r.budget.within(1e-3));
+}
+
 TEST(Planner, WithoutABudgetCandidatesAreEnoughWhereFewerAre) {
   Scene easy = spun_about("z", 1e-2), hard = spun_about("z", 1e-12);
   easy.error_budget = hard.error_budget = false;
