@@ -49,15 +49,15 @@ BodyScene with_more_of_each_kind(const BodyScene& b, int more, const std::filesy
   const bool in_plane = b.directions != "all";
   BodyScene richer = b;
   richer.shapes.clear();
-  const PreparedBody own = prepared(b, 0, keep, hooks), whole = prepared(richer, 0, keep, hooks);
+  const std::map<std::string, int> kinds = kinds_of(prepared(b, 0, keep, hooks));
+  const PreparedBody whole = prepared(richer, 0, keep, hooks);
+  const int highest = in_plane ? 2 * b.modes : b.shapes.empty() ? b.modes : b.shapes.back();
   richer.directions = "all";
   for (int i = 1;; ++i) {
-    const int highest = in_plane ? 2 * b.modes : b.shapes.empty() ? b.modes : b.shapes.back();
     const int wanted = std::max(b.modes, highest + 2 * i * more);
     richer = with_modes(std::move(richer), wanted, keep, hooks);
     const PreparedBody all = prepared(richer, 0, keep, hooks);
     const std::vector<int> places = places_of(b, whole, all);
-    const std::map<std::string, int> kinds = kinds_of(own);
     std::map<std::string, int> beside;
     std::vector<int> shapes;
     for (int k = 1; k <= all.body.n(); ++k) {

@@ -18,6 +18,14 @@ const ReducedBody& carried_body(const Tree& tree, size_t joint) {
   return tree.scene().bodies[static_cast<size_t>(tree.scene().joints[joint].b.body)];
 }
 
+/// Twice the energy of the elastic coordinate of a body that has the most. q, q_dot: where its coordinates start in y.
+double most_held(const ReducedBody& body, const VectorXd& y, int q, int q_dot) {
+  double most = 0;
+  for (int k = 0; k < body.n(); ++k)
+    most = std::max(most, body.Ke(k, k) * y[q + k] * y[q + k] + body.Me(k, k) * y[q_dot + k] * y[q_dot + k]);
+  return most;
+}
+
 }  // namespace
 
 ErrorScales::ErrorScales(const Tree& tree, const VectorXd& y0, double tolerance, bool rescale)
@@ -73,13 +81,9 @@ void ErrorScales::restart(const VectorXd& y) {
 /// To a part of what each elastic coordinate would be, had it the energy of the one that has had the most.
 void ErrorScales::raise_floors(const VectorXd& y) {
   const TreeLayout& l = tree_.layout();
-  double most = 0;  // twice that energy
-  for (size_t b = 0; b < l.q.size(); ++b) {
-    const ReducedBody& body = tree_.scene().bodies[b];
-    const auto q = y.segment(l.q[b], body.n()), q_dot = y.segment(l.rate(l.q[b]), body.n());
-    for (int k = 0; k < body.n(); ++k)
-      most = std::max(most, body.Ke(k, k) * q[k] * q[k] + body.Me(k, k) * q_dot[k] * q_dot[k]);
-  }
+  double most = 0;
+  for (size_t b = 0; b < l.q.size(); ++b)
+    most = std::max(most, most_held(tree_.scene().bodies[b], y, l.q[b], l.rate(l.q[b])));
   if (most <= most_held_) return;
   most_held_ = most;
   const auto raise_to = [&](int i, double size) {
@@ -129,9 +133,7 @@ void ErrorScales::for_each_size(const VectorXd& y, const Each& each) const {
   for (size_t b = 0; b < l.q.size(); ++b) {
     const ReducedBody& body = tree_.scene().bodies[b];
     const int q = l.q[b], q_dot = l.rate(q);
-    double held = 0;
-    for (int k = 0; k < body.n(); ++k)
-      held = std::max(held, body.Ke(k, k) * y[q + k] * y[q + k] + body.Me(k, k) * y[q_dot + k] * y[q_dot + k]);
+    const double held = most_held(body, y, q, q_dot);
     for (int k = 0; k < body.n(); ++k) {
       elastic(q + k, body.Ke(k, k) > 0 ? std::sqrt(held / body.Ke(k, k)) : 0.0);
       elastic(q_dot + k, std::sqrt(held / body.Me(k, k)));
