@@ -29,7 +29,7 @@ using toml_writer::toml;
 
 namespace {
 
-constexpr std::string_view state_format = "flexboom-state-5";
+constexpr std::string_view state_format = "flexboom-state-6";
 constexpr std::string_view checksum_key = "sha256";
 
 /// The line that holds the checksum of all others, or an empty one behind the end.
@@ -123,6 +123,7 @@ std::string to_toml(const FlightState& state, const std::string& scene) {
   for (const auto& [body, list] : state.shapes) out.key(toml(body), list);
   out.table("[largest]");
   out.key("energy", state.largest.energy, "[J], of the whole run: what its balances are relative to");
+  out.key("shaking", state.largest.shaking, "[J], without the spin of wheels: what errors are weighed against");
   out.key("momentum", state.largest.momentum, "[N s]");
   out.key("angular_momentum", state.largest.angular_momentum, "[N m s]");
   out.table("[state]");
@@ -260,8 +261,9 @@ SavedState SavedState::read(const fs::path& path, bool changed_too) {
   table.table("state", true);
   if (std::optional<TableReader> largest = table.table("largest", true)) {
     MotionScales& l = content->largest;
-    for (const auto& [name, value] : {std::pair{"energy", &l.energy}, std::pair{"momentum", &l.momentum},
-                                      std::pair{"angular_momentum", &l.angular_momentum}}) {
+    for (const auto& [name, value] :
+         {std::pair{"energy", &l.energy}, std::pair{"shaking", &l.shaking}, std::pair{"momentum", &l.momentum},
+          std::pair{"angular_momentum", &l.angular_momentum}}) {
       *value = finite(*largest, name);
       if (*value < 0) largest->fault(name, "must not be negative");
     }

@@ -31,6 +31,7 @@ class Conservation {
     dP_ = std::max(dP_, (b.momentum - P_).norm());
     dH_ = std::max(dH_, (b.angular_momentum - H_).norm());
     largest_.energy = std::max(largest_.energy, size);
+    largest_.shaking = std::max(largest_.shaking, b.shaking());
     largest_.momentum = std::max(largest_.momentum, b.momentum_scale);
     largest_.angular_momentum = std::max(largest_.angular_momentum, b.angular_momentum_scale);
   }

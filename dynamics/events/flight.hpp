@@ -34,6 +34,7 @@ constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 /// what is much.
 struct MotionScales {
   double energy = 0;            // [J]
+  double shaking = 0;           // without that of wheels on their axles [J]
   double momentum = 0;          // sum over the bodies of the norms [N s]
   double angular_momentum = 0;  // the same [N m s]
 };

@@ -33,6 +33,7 @@ ErrorScales::ErrorScales(const Tree& tree, const VectorXd& y0, double tolerance,
       rescale_(rescale),
       start_attitude_(tree.scene().joints.size(), Vector4d(1, 0, 0, 0)),
       period_(tree.scene().joints.size(), 0.0),
+      spring_rate_(tree.scene().joints.size(), 0.0),
       largest_(VectorXd::Zero(y0.size())),
       own_(VectorXd::Zero(y0.size())) {
   error_.tolerance = tolerance;
@@ -41,8 +42,9 @@ ErrorScales::ErrorScales(const Tree& tree, const VectorXd& y0, double tolerance,
     if (place.attitude >= 0) start_attitude_[i] = y0.segment<4>(place.attitude);
     const Joint& joint = tree.scene().joints[i];
     const bool is_sprung = joint.mechanism.stiffness > 0 || joint.mechanism.stop_stiffness > 0;
-    if (is_sprung && joint.prescribed.empty() && !joint.law.given())
-      period_[i] = stop_of(joint, i, carried_body(tree, i)).period;
+    if (!is_sprung || !joint.prescribed.empty() || joint.law.given()) continue;
+    const Stop stop = stop_of(joint, i, carried_body(tree, i));
+    period_[i] = stop.period, spring_rate_[i] = stop.spring_rate;
   }
   set_floors(y0);
   observe(y0);
@@ -111,10 +113,10 @@ void ErrorScales::for_each_size(const VectorXd& y, const Each& each) const {
     const TreeLayout::Joint& j = l.joints[i];
     for (int k = 0; k < joint_type(tree_.scene().joints[i].kind).scalars; ++k) {
       const int at = j.scalar + k, rate = l.rate(at);
-      // Gap and rate measure each other: at the stop the gap is zero but the motion is not.
-      const bool sprung = period_[i] > 0;
-      each(at, std::max(std::abs(y[at]), sprung ? std::abs(y[rate]) * period_[i] : 0.0));
-      each(rate, std::max(std::abs(y[rate]), sprung ? std::abs(y[at]) / period_[i] : 0.0));
+      // Gap and rate measure each other: at the stop the gap is zero but the motion is not, where the spring turns back
+      // it is the other way round. What a spring presses into its stop at rest does not move: no stop in the rate.
+      each(at, std::max(std::abs(y[at]), std::abs(y[rate]) * period_[i]));
+      each(rate, std::max(std::abs(y[rate]), std::abs(y[at]) * spring_rate_[i]));
     }
     for (const int first : {j.omega, j.position, j.velocity})
       if (first >= 0) vector(first);
@@ -166,8 +168,7 @@ void ErrorScales::set_floors(const VectorXd& y0) {
   VectorXd beside = y0;  // on their way through space: that energy shakes nothing
   for (const TreeLayout::Joint& j : l.joints)
     if (j.velocity >= 0) beside.segment<3>(j.velocity).setZero();
-  const Balance balance = tree_.balance(0, beside);
-  const double energy = std::abs(balance.kinetic) + std::abs(balance.elastic);
+  const double energy = tree_.balance(0, beside).shaking();
   floor_.tail(l.size - l.dissipated).setConstant(std::max(energy, of_size));
   // A quaternion's entries are near 1: less than its round-off can not be asked for.
   const double least_turn = 1e-14 / error_.tolerance;

@@ -41,6 +41,7 @@ class ErrorScales {
   bool rescale_;
   std::vector<Eigen::Vector4d> start_attitude_;  // per joint
   std::vector<double> period_;                   // per joint, on its spring and stop, over 2 pi [s]; 0: it has none
+  std::vector<double> spring_rate_;              // per joint, on its spring alone, angular [rad/s]; 0: it has none
   Eigen::VectorXd floor_, bound_, largest_;      // bound: what the energy at the start could make; 0: it says nothing
   Eigen::VectorXd own_;                          // largest |y| of each state
   Eigen::VectorXd highest_floor_;  // where the start has no energy: of the elastic coordinates; else empty

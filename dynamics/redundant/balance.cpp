@@ -28,9 +28,10 @@ Balance balance_of(const Equations& equations, const VectorXd& y, const JointMem
       if (w.body != static_cast<int>(i)) continue;
       const double h = y[equations.wheel(k)];
       of.angular += A * (h * w.axis);
-      of.kinetic += h * h / (2 * w.inertia);
+      b.kinetic += h * h / (2 * w.inertia);
     }
     b.kinetic += of.kinetic;
+    b.bodies += of.kinetic;
     b.momentum += of.linear;
     b.momentum_scale += of.linear.norm();
     b.angular_momentum += of.angular + s.position.cross(of.linear);

@@ -149,7 +149,7 @@ Totals totals(const Model& model, const double* y, const Instant& instant, const
     const Vec3<double>& axis = model.wheels[i].at.position;
     const double J = model.scene->wheels[i].inertia, spin = y[model.spin + static_cast<int>(i)] + dot(axis, s.w);
     const Vec3<double> in_space = s.A0 * axis;
-    r.kinetic += 0.5 * J * spin * spin;
+    r.spinning += 0.5 * J * spin * spin;
     r.angular_momentum += (J * spin) * in_space;
     r.angular_momentum_scale += std::abs(J * spin);
     subtract_dyad(r.inertia, -J, in_space);

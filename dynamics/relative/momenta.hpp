@@ -25,7 +25,8 @@ struct MassMotion {
 struct Totals : MassMotion {
   Vec3<double> angular_momentum;
   Sym3<double> inertia;
-  double kinetic = 0, strain = 0;  // strain: of the shapes
+  double kinetic = 0, strain = 0;  // of the bodies; strain: of the shapes
+  double spinning = 0;             // kinetic, of wheels
   // Sums over the bodies of |momentum| in inertial space, and of |angular momentum| about each one's own origin.
   double momentum_scale = 0, angular_momentum_scale = 0;
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <span>
@@ -59,10 +60,13 @@ struct PlaceMotionInSpace {
 /// Energies [J] and momenta (inertial axes; angular about the mass centre).
 struct Balance {
   double kinetic = 0, elastic = 0, potential = 0;  // potential: of gravity
+  double bodies = 0;                               // of kinetic: all but the spin of wheels
   double dissipated = 0, work = 0;                 // since the start
 
   /// What is kept.
   double energy() const { return kinetic + elastic + potential + dissipated - work; }
+  /// What can shake the bodies: wheels spin on, whatever their energy.
+  double shaking() const { return std::abs(bodies) + std::abs(elastic); }
   std::vector<double> dissipated_by_joint;
   EnergyLedger ledger;  // of elastic and dissipated
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero();

@@ -53,10 +53,9 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     start_on_constraints(frame_->seen(start));
     begin_contacts();
     equations_.make_consistent(t_, y_, y_dot_, memory_);
-    const Balance b = balance_of(equations_, y_, memory_);
-    scales_ = std::make_unique<StateScales>(
-        equations_, y_, y_dot_, std::max(std::abs(b.kinetic) + std::abs(b.elastic), options_.largest.energy),
-        local_share * options.tolerance, options.duration);
+    const double shaking = std::max(balance_of(equations_, y_, memory_).shaking(), options_.largest.shaking);
+    scales_ = std::make_unique<StateScales>(equations_, y_, y_dot_, shaking, local_share * options.tolerance,
+                                            options.duration);
     make_method();
   }
 
