@@ -237,7 +237,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   void strike(double impulse) override { y_ += impulse * blow_; }
 
   double noise(size_t stop) const override {
-    constexpr double of_steps = 3, round_off = 1e-14;
+    constexpr double of_steps = 0.3, round_off = 1e-14;
     return std::max(round_off, of_steps * local_share * options_.tolerance * contacts_.largest_gap(stop));
   }
 
