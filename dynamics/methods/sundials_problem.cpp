@@ -1,7 +1,6 @@
 #include "dynamics/methods/sundials_problem.hpp"
 
 #include "dynamics/numerics/method_failure.hpp"
-
 #include "fem/base/check.hpp"
 
 #include <nvector/nvector_serial.h>
@@ -11,6 +10,26 @@
 #include <utility>
 
 namespace flexboom::sundials {
+
+namespace {
+
+/// What SUNDIALS hears of a call: 0, it is done; 1, a shorter step may do; -1, nothing will. Its error waits for
+/// `Problem::rethrow`.
+template <class Call>
+int guarded(std::exception_ptr& error, const Call& call) noexcept {
+  try {
+    call();
+    return 0;
+  } catch (const UnfitState&) {
+    error = std::current_exception();
+    return 1;
+  } catch (...) {  // a function of time may throw
+    error = std::current_exception();
+    return -1;
+  }
+}
+
+}  // namespace
 
 Problem::Problem(std::unique_ptr<Ode> ode, const ErrorScale& scale, SUNContext context)
     : ode_(std::move(ode)), scale_(scale), contact_(static_cast<size_t>(ode_->stops()), 0) {
@@ -42,16 +61,8 @@ void Problem::rethrow(int flag, double from, double to) {
 
 int Problem::derivative(realtype t, N_Vector y, N_Vector y_dot, void* problem) noexcept {
   auto& self = *static_cast<Problem*>(problem);
-  try {
-    self.ode_->derivative(t, N_VGetArrayPointer(y), self.contact_, N_VGetArrayPointer(y_dot));
-    return 0;
-  } catch (const UnfitState&) {
-    self.error_ = std::current_exception();
-    return 1;
-  } catch (...) {  // a function of time may throw
-    self.error_ = std::current_exception();
-    return -1;
-  }
+  return guarded(self.error_,
+                 [&] { self.ode_->derivative(t, N_VGetArrayPointer(y), self.contact_, N_VGetArrayPointer(y_dot)); });
 }
 
 int Problem::weights(N_Vector, N_Vector weight, void* problem) noexcept {
@@ -65,21 +76,14 @@ int Problem::weights(N_Vector, N_Vector weight, void* problem) noexcept {
 int Problem::linear_system(realtype t, N_Vector y, booleantype jacobian_is_current, booleantype* jacobian_was_updated,
                            realtype gamma, void* problem) noexcept {
   auto& self = *static_cast<Problem*>(problem);
-  try {
+  return guarded(self.error_, [&] {
     if (!jacobian_is_current) {
       self.ode_->jacobian(t, N_VGetArrayPointer(y), self.contact_);
       ++self.jacobians_;
     }
     *jacobian_was_updated = !jacobian_is_current;
     self.ode_->factorise(gamma);
-    return 0;
-  } catch (const UnfitState&) {
-    self.error_ = std::current_exception();
-    return 1;
-  } catch (...) {
-    self.error_ = std::current_exception();
-    return -1;
-  }
+  });
 }
 
 }  // namespace flexboom::sundials

@@ -32,7 +32,8 @@ PROGRAM = os.environ.get("FLEXBOOM_PROGRAM", "flexboom")
 
 def flexboom(*arguments, **options):
     """Runs the program to its end; stdout and stderr as text."""
-    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": 60, **options}
+    hangs = 300  # [s]: with sanitizers on a slow machine a run takes a minute
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": hangs, **options}
     return subprocess.run([PROGRAM, *map(str, arguments)], stdin=subprocess.DEVNULL, text=True, **options)
 
 
