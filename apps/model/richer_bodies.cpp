@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 
 namespace flexboom {
@@ -25,6 +26,12 @@ std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions 
                                            int threads) {
   o.select.reset();
   const int given = o.basis.modes;
+  const bool has_statics = o.basis.name == "clamped" && !o.basis.in_plane && model.body && !model.clamped.empty();
+  if (has_statics) {
+    std::vector<std::string>& corrections = o.basis.corrections;
+    for (const std::string& shape : static_shapes_beside(kept, model.clamped))
+      if (std::ranges::find(corrections, shape) == corrections.end()) corrections.push_back(shape);
+  }
   for (int more = 8; more >= 0; more -= 2) {
     o.basis.modes = given + (o.basis.in_plane ? more / 2 : more);
     try {
@@ -38,6 +45,17 @@ std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions 
 }
 
 }  // namespace
+
+std::vector<std::string> static_shapes_beside(const ReducedBody& body, const std::string& clamped) {
+  const auto has = [&](const char* kind) {
+    return std::ranges::find(body.coordinates, kind, &Coordinate::kind) != body.coordinates.end();
+  };
+  const std::string end = clamped == "tip" ? "root" : "tip";
+  std::vector<std::string> shapes;
+  if (!has("axial")) shapes.push_back(end + ".Fx");
+  if (!has("torsion")) shapes.push_back(end + ".Mx");
+  return shapes;
+}
 
 RicherBodies richer_bodies(const Model& model, const ReductionOptions& options, const ReducedBody& kept,
                            const std::string& errors, int threads, std::vector<std::string>& notes) {

@@ -1,11 +1,13 @@
 #include "apps/simulate/error_budget.hpp"
 
+#include "apps/model/richer_bodies.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <string_view>
 #include <utility>
@@ -42,51 +44,76 @@ std::vector<int> places_of(const BodyScene& b, const PreparedBody& whole, const 
   return places;
 }
 
-/// Its own modes and the lowest beside them: `more` of each kind that it has, half as many of others.
-BodyScene with_more_of_each_kind(const BodyScene& b, int more, const std::filesystem::path& keep,
-                                 const RunHooks& hooks) {
-  constexpr int most_trials = 4;
-  const bool in_plane = b.directions != "all";
-  BodyScene richer = b;
-  richer.shapes.clear();
-  const std::map<std::string, int> kinds = kinds_of(prepared(b, 0, keep, hooks));
-  const PreparedBody whole = prepared(richer, 0, keep, hooks);
-  const int highest = in_plane ? 2 * b.modes : b.shapes.empty() ? b.modes : b.shapes.back();
-  richer.directions = "all";
-  for (int i = 1;; ++i) {
-    const int wanted = std::max(b.modes, highest + 2 * i * more);
-    richer = with_modes(std::move(richer), wanted, keep, hooks);
-    const PreparedBody all = prepared(richer, 0, keep, hooks);
-    const std::vector<int> places = places_of(b, whole, all);
-    std::map<std::string, int> beside;
-    std::vector<int> shapes;
-    for (int k = 1; k <= all.body.n(); ++k) {
-      const std::string& kind = all.body.coordinates[static_cast<size_t>(k) - 1].kind;
-      const int of_kind = kinds.empty() || kinds.contains(kind) ? more : more / 2;
-      if (std::ranges::find(places, k) != places.end() || ++beside[kind] <= of_kind) shapes.push_back(k);
-    }
-    const bool enough = std::ranges::all_of(kinds, [&](const auto& kind) { return beside[kind.first] >= more; });
-    if (!enough && i < most_trials && richer.modes == wanted) continue;
-    richer.shapes = std::move(shapes);
-    return richer;
+/// The lowest modes of all directions: the `highest` that is kept, and enough beyond those of each kind in `kinds`.
+/// Those of beams go on until some stretch and some twist; where none do, static shapes stand for them.
+BodyScene with_modes_beyond(BodyScene b, int highest, const ModesBeyond& more, const std::map<std::string, int>& kinds,
+                            const std::filesystem::path& keep, const RunHooks& hooks) {
+  constexpr int most = 64;
+  b.shapes.clear();
+  b.directions = "all";
+  b = with_modes(std::move(b), std::max(highest, 2), keep, hooks);
+  const int resolved = prepared(b, 0, keep, hooks).dofs / 2;  // by the elements; of the others nothing is learnt
+  for (int i = 1;; i *= 2) {
+    const int wanted = std::max(highest, std::min(highest + 2 * i * more.of(0), resolved));
+    b = with_modes(std::move(b), wanted, keep, hooks);
+    const PreparedBody all = prepared(b, 0, keep, hooks);
+    std::map<std::string, int> count = kinds_of(all);
+    const bool enough =
+        std::ranges::all_of(kinds, [&](const auto& k) { return count[k.first] >= k.second + more.of(k.second); });
+    const std::vector<std::string> statics = static_shapes_beside(all.body, b.clamp);
+    const bool has_more = b.modes == wanted && wanted < std::min(highest + most, resolved);
+    if (has_more && (!enough || (b.structure == "beam" && !statics.empty()))) continue;
+    if (b.structure == "beam" || b.structure == "solid")
+      std::ranges::copy(statics, std::back_inserter(b.basis.corrections));
+    return b;
   }
+}
+
+/// Its own modes and the lowest beside them: half as many of kinds that it has not.
+BodyScene with_more_of_each_kind(const BodyScene& b, const ModesBeyond& more, const std::filesystem::path& keep,
+                                 const RunHooks& hooks) {
+  const bool in_plane = b.directions != "all";
+  BodyScene own = b;
+  own.shapes.clear();
+  const std::map<std::string, int> kinds = kinds_of(prepared(b, 0, keep, hooks));
+  const PreparedBody whole = prepared(own, 0, keep, hooks);
+  const int highest = in_plane ? 2 * b.modes : b.shapes.empty() ? b.modes : b.shapes.back();
+  BodyScene richer = with_modes_beyond(b, std::max(highest, b.modes), more, kinds, keep, hooks);
+  const PreparedBody all = prepared(richer, 0, keep, hooks);
+  const std::vector<int> places = places_of(b, whole, all);
+  std::map<std::string, int> beside;
+  for (int k = 1; k <= all.body.n(); ++k) {
+    const std::string& kind = all.body.coordinates[static_cast<size_t>(k) - 1].kind;
+    const bool is_static = k > richer.modes;
+    const auto own_kind = kinds.find(kind);
+    const int of_kind = own_kind != kinds.end() ? more.of(own_kind->second)
+                        : kinds.empty()         ? more.of(0)
+                                                : more.of(0) / 2;
+    if (is_static || std::ranges::find(places, k) != places.end() || ++beside[kind] <= of_kind)
+      richer.shapes.push_back(k);
+  }
+  return richer;
 }
 
 }  // namespace
 
 BodyScene with_modes(BodyScene b, int wanted, const std::filesystem::path& keep, const RunHooks& hooks) {
   b.shapes.clear();
-  for (b.modes = wanted; b.modes > 2; b.modes -= 2) {
+  for (b.modes = wanted; b.modes > 2;) {
     try {
       prepared(b, 0, keep, hooks);
       break;
     } catch (const InputError&) {  // that is another fault where two modes have it, too
+      b.modes -= 2;
+    } catch (const NumericalError&) {  // nearly all modes of the elements: the last are beyond any solver
+      b.modes -= std::max(2, b.modes / 4);
     }
   }
+  b.modes = std::max(b.modes, std::min(wanted, 2));
   return b;
 }
 
-Scene with_more_modes(Scene scene, int more, const RunHooks& hooks) {
+Scene with_more_modes(Scene scene, const ModesBeyond& more, const RunHooks& hooks) {
   for (BodyScene& b : scene.bodies) {
     if (has(b, &RicherBodies::more_modes)) {
       b.reduced = {b.richer, &*b.richer->more_modes};
@@ -97,7 +124,8 @@ Scene with_more_modes(Scene scene, int more, const RunHooks& hooks) {
       b = with_more_of_each_kind(b, more, scene.bodies_kept_in, hooks);
       continue;
     }
-    b.modes = b.directions == "all" ? b.modes + 2 * more : 2 * (b.modes + more);
+    const int per_plane = b.directions == "all" ? (b.modes + 1) / 2 : b.modes;
+    b.modes = 2 * (per_plane + more.of(per_plane));
     b.directions = "all";
     b.shapes.clear();
   }
@@ -191,13 +219,15 @@ struct Measuring {
     budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
   }
 
-  /// Enters what a repeat has changed in each output, `factor` times, and `more` of the largest value of each. Returns
-  /// the largest.
-  double enter(Part part, const std::vector<OutputDifference>& differences, double more = 0, double factor = 1) {
+  /// Enters what a repeat has changed in each output, `factor` times, loads `factor_of_loads` times more, and `more` of
+  /// the largest value of each. Returns the largest.
+  double enter(Part part, const std::vector<OutputDifference>& differences, double more = 0, double factor = 1,
+               double factor_of_loads = 1) {
     double most = 0;
     for (OutputErrors& o : budget.outputs) {
       const auto d = std::ranges::find(differences, o.name, &OutputDifference::name);
-      const double error = d == differences.end() ? 0 : factor * d->error, before = worst_part(o);
+      const double times = is_load(o.name) ? factor * factor_of_loads : factor;
+      const double error = d == differences.end() ? 0 : times * d->error, before = worst_part(o);
       if (d != differences.end()) o.scale = std::max(o.scale, d->scale), o.size = std::max(o.size, d->size);
       o.*part = error + (o.scale > 0 ? more * o.size / o.scale : 0);
       if (error > before) o.when = d->time;
@@ -263,15 +293,18 @@ std::vector<OutputDifference> change(const Run& run, const Scene& other, int ref
 }
 
 /// The modes left out, first with few digits: more only where the answer would drown in the error of time integration.
+/// A jump of an acceleration rings all modes of a body, and a load of its joint converges like their effective mass: as
+/// 1 / n. What as many modes more change is then half of the error.
 double truncation_error(const Run& run, const Scene& flown, const StillKinds& still, Measuring& m) {
-  Scene more = without_kinds(with_more_modes(flown, modes_of_truncation, m.hooks), still, m.hooks);
+  const bool loads = std::ranges::any_of(m.budget.outputs, is_load, &OutputErrors::name);
+  Scene more = without_kinds(with_more_modes(flown, {.as_many = loads}, m.hooks), still, m.hooks);
   more.tolerance = std::max(flown.tolerance, 1e-5);
   std::vector<OutputDifference> differences = change(run, more, 0, m);
   if (more.tolerance != flown.tolerance && largest(differences) <= 10 * more.tolerance) {
     more.tolerance = flown.tolerance;
     differences = change(run, more, 0, m);
   }
-  return m.enter(&OutputErrors::truncation, differences);
+  return m.enter(&OutputErrors::truncation, differences, 0, 1, 2);
 }
 
 /// All that the scene leaves to the program.

@@ -2,6 +2,7 @@
 
 #include "apps/simulate/simulate.hpp"
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <string>
@@ -28,14 +29,20 @@ ErrorBudget measure_budget(const Scene&, Run& run, const RunHooks&, std::vector<
 /// With as many modes as the elements have, `wanted` at most.
 BodyScene with_modes(BodyScene, int wanted, const std::filesystem::path& keep, const RunHooks&);
 
-/// So many of each kind show what a model leaves out: the next two alone may happen to do little.
-inline constexpr int modes_of_truncation = 4;
+/// How many modes more show what a model leaves out.
+struct ModesBeyond {
+  int least = 4;         // of each kind: the next two alone may happen to do little
+  bool as_many = false;  // as are kept, where those are more
 
-/// Clamped bodies get the lowest modes that are left out: `more` of each kind that they have, half as many of others,
-/// for what bends out of the hinge plane is left out, too.
+  int of(int kept) const { return as_many ? std::max(least, kept) : least; }
+};
+
+/// Clamped bodies get the lowest modes that are left out: so many of each kind that they have, half as many of others,
+/// for what bends out of the hinge plane is left out, too. Some stretch and some twist; static shapes of loads at the
+/// free end stand for them where no mode among many does.
 /// Other bases get so many in each plane. Bodies from files get the modes that their files have beyond those kept.
 /// @throws InputError, NumericalError as prepare_body.
-Scene with_more_modes(Scene, int more, const RunHooks&);
+Scene with_more_modes(Scene, const ModesBeyond&, const RunHooks&);
 
 /// The scene with the geometric stiffness that its run had: a repeat changes one thing alone.
 Scene as_flown(Scene, const Run&);

@@ -88,6 +88,10 @@ double bearable(const std::string& output, const OutputFloors& floors, const std
 
 bool is_coordinate(const std::string& column) { return output_of_column(column).ends_with(".q"); }
 
+bool is_load(const std::string& output) {
+  return output.ends_with(".force") || output.ends_with(".torque") || output.ends_with(".drive");
+}
+
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted, const OutputFloors& floors) {
   std::vector<WantedOutput> asked, order;

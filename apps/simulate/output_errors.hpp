@@ -21,6 +21,9 @@ struct OutputTable {
 /// Is a column an elastic coordinate, "boom.q2"?
 bool is_coordinate(const std::string& column);
 
+/// Is an output the force, the torque or the drive of a joint?
+bool is_load(const std::string& output);
+
 /// What makes of an output that hardly moves no more than it is: the errors that its scale must bear.
 struct OutputFloors {
   double tolerance = 1;                   // what relative errors are held against

@@ -30,8 +30,8 @@ constexpr int fewest = 4;            // candidates per body
 constexpr int for_budget = 8;        // modes beside the candidates that show their truncation
 constexpr int most_trials = 6;       // runs with fewer modes
 constexpr int most_rounds = 5;       // improvements
-constexpr double not_near = 10;    // times the tolerance: of the most modes that are not enough, where errors converge
-constexpr int most_doublings = 2;  // of the candidates, before a budget shows what they leave out
+constexpr double not_near = 10;      // times the tolerance: more modes that hardly help do not get there
+constexpr int most_doublings = 2;    // of the candidates, before a budget shows what they leave out
 constexpr double nearly_all = 0.85;  // of the candidates: where so many are needed, more would be, too
 
 bool stopped(const RunHooks& hooks) { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
@@ -113,10 +113,12 @@ void Planner::note_still(const std::vector<Candidate>& list) {
 }
 
 void Planner::note_shown(const Scene& planned, const RunHooks& hooks) {
-  const Scene more = with_more_modes(planned, modes_of_truncation, hooks);
-  for (const size_t i : open_)
-    if (planned.bodies[i].basis.name == "clamped" && planned.bodies[i].directions == "all")
-      shown_[planned.bodies[i].name] = more.bodies[i];
+  const Scene more = with_more_modes(planned, {}, hooks);
+  for (const size_t i : open_) {
+    if (planned.bodies[i].basis.name != "clamped" || planned.bodies[i].directions != "all") continue;
+    BodyScene& shown = shown_[planned.bodies[i].name] = more.bodies[i];
+    std::erase_if(shown.shapes, [&](int k) { return k > shown.modes; });  // static shapes are no candidates
+  }
 }
 
 Scene Planner::with_first(const Scene& all, const std::vector<Candidate>& list, size_t count) const {
@@ -264,8 +266,8 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
   if (worst->known() <= scene.tolerance || std::max(truncation, discretisation) <= others) return false;
   if (truncation >= discretisation) {
     const double before = std::exchange(truncation_, worst->truncation);
-    const bool hardly_changes = hopeless_ || truncation_ > before / 2;
-    if (costly_ || hardly_changes || candidates_ >= most_candidates) return false;
+    const bool is_far = truncation_ > before / 2 && truncation_ > not_near * scene.tolerance;
+    if (costly_ || hopeless_ || is_far || candidates_ >= most_candidates) return false;
     candidates_ = std::min(candidates_ + candidates_ / 2, most_candidates);
     note_shown(scene, hooks);
     too_few_ = kept_ + 1;

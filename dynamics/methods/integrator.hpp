@@ -58,9 +58,6 @@ struct StepCounts {
 
 void add_counts(const StepCounts&, IntegrationSummary&);
 
-/// What errors of steps add up to in a gap, in units of the error that a step is allowed.
-inline constexpr double noise_of_methods = 1;
-
 /// One integration method on one system. Each step is smooth: the contact flags are constant between restarts.
 class Stepper {
  public:

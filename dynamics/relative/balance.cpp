@@ -59,8 +59,8 @@ Balance Tree::balance(double t, const Eigen::Ref<const VectorXd>& y, TreeWorkspa
   const tree::Totals all = tree::totals(model, y.data(), work.instant, near, scratch);
   Balance b;
   const Vector3d P = eigen(all.momentum), V = eigen(near.velocity);
-  b.bodies = all.kinetic + V.dot(P) + 0.5 * all.m * V.squaredNorm();
-  b.kinetic = b.bodies + all.spinning;
+  b.bodies = all.kinetic;
+  b.kinetic = all.kinetic + V.dot(P) + 0.5 * all.m * V.squaredNorm() + all.spinning;
   b.momentum = P + all.m * V;
   b.momentum_scale = all.momentum_scale;
   b.angular_momentum = eigen(all.angular_momentum_about_mass_centre());

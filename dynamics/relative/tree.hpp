@@ -60,7 +60,7 @@ struct PlaceMotionInSpace {
 /// Energies [J] and momenta (inertial axes; angular about the mass centre).
 struct Balance {
   double kinetic = 0, elastic = 0, potential = 0;  // potential: of gravity
-  double bodies = 0;                               // of kinetic: all but the spin of wheels
+  double bodies = 0;                               // of kinetic: neither spin of wheels nor way through space
   double dissipated = 0, work = 0;                 // since the start
 
   /// What is kept.

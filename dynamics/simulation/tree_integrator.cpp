@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace flexboom {
 
@@ -111,7 +112,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   /// has the round-off of what turns.
   double noise(size_t stop) const override {
     const ErrorScale& error = scales_.error();
-    const double of_steps = noise_of_methods * error.tolerance * error.scale[scalar(stop)];
+    const double of_steps = error.tolerance * error.scale[scalar(stop)];
     const double of_method = exact_in_linear_part_ ? std::min(of_steps, 1e-14 * contacts_.largest_gap(stop)) : of_steps;
     return std::max(of_method, 1e-16 * fastest_turn_ * contacts_.stop(stop).period);
   }
@@ -266,10 +267,14 @@ class TreeFlight final : public Flight<TreeTrajectory> {
 
 }  // namespace
 
+/// Let go, or after a blow, the root of a body with many modes flies off for an instant as if it carried nothing. What
+/// presses a body no longer than that does not buckle it.
 void observe(const std::vector<StiffeningEffect>& effect, double t, std::vector<LargestStiffening>& largest) {
   for (size_t b = 0; b < effect.size(); ++b) {
-    largest[b].size = std::max(largest[b].size, effect[b].size);
-    if (effect[b].softening > largest[b].softening) largest[b].softening = effect[b].softening, largest[b].time = t;
+    LargestStiffening& l = largest[b];
+    l.size = std::max(l.size, effect[b].size);
+    const double lasting = std::min(effect[b].softening, std::exchange(l.last_softening, effect[b].softening));
+    if (lasting > l.softening) l.softening = lasting, l.time = t;
   }
 }
 

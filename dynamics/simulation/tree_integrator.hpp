@@ -11,8 +11,10 @@ namespace flexboom {
 
 /// The largest StiffeningEffect of a body in a flight.
 struct LargestStiffening {
-  double size = 0, softening = 0;
-  double time = 0;  // of the largest softening [s]
+  double size = 0;
+  double softening = 0;       // that lasts from one look to the next
+  double time = 0;            // of that [s]
+  double last_softening = 0;  // at the last look
 };
 /// A long flight is looked at this often: each look costs an evaluation and an eigenvalue problem per body.
 inline constexpr int looks_at_stiffening = 200;

@@ -97,6 +97,69 @@ TEST_P(Budget, NotAskedForIsNotMet) {
   for (const auto& [part, value] : summary["error_budget"].items()) EXPECT_TRUE(value.is_null()) << part;
 }
 
+/// A bar that is fixed to the ground or hangs on a pin there, with its weight along (x, y, 0).
+Scene held_bar(const std::string& joint, double x, double y, double diameter, double length, int modes) {
+  return parse_scene(fmt::format(R"(format = "flexboom-scene-1"
+name = "bar"
+duration = 0.5
+output_step = 0.005
+gravity = [{}, {}, 0]
+accuracy = {{ tolerance = 1e-5 }}
+[[bodies]]
+name = "bar"
+modes = {}
+stiffening = "on"
+directions = "all"
+damping = {{ rule = "modal", value = 0.02 }}
+[[bodies.segments]]
+shape = "round-bar"
+diameter = {}
+length = {}
+material = {{ E = 70e9, nu = 0.33, rho = 2700 }}
+[[joints]]
+name = "pin"
+kind = "{}"
+b = {{ body = "bar", marker = "root" }}
+loads = true
+)",
+                                 x, y, modes, diameter, length, joint),
+                     "bar.toml");
+}
+
+// The first mode that stretches a slender bar is beyond 20 that bend it, that of a wire beyond 100: what hangs still
+// gets longer.
+TEST_P(Budget, CountsTheStretchOfASlenderBar) {
+  for (const double diameter : {0.02, 0.0005}) {
+    SCOPED_TRACE(diameter);
+    Scene scene = held_bar("fixed", 9.81, 0, diameter, 10, 6);
+    scene.outputs = {"bar.tip"};
+    const RunResult r = run(scene);
+    EXPECT_NEAR(r.budget.truncation, 1, 0.1);
+    const OutputErrors& tip = r.budget.outputs.front();
+    // Let go at once, a bar stretches to twice its length under its weight, rho g L^2 / 2 E; one shape alone falls
+    // short.
+    const double weight = 2700 * 9.81 * 10 * 10 / (2 * 70e9);
+    EXPECT_GT(tip.scale, weight);
+    EXPECT_LT(tip.scale, 2.2 * weight);
+  }
+}
+
+// The load of a pin converges as 1 / n: the next four modes show a part of what all others do.
+TEST(BudgetOfATree, CountsWhatManyModesDoToTheLoadOfAJoint) {
+  Scene scene = held_bar("hinge", 0, -9.81, 0.006, 1.2, 7);
+  scene.bodies[0].directions = "hinge-plane";
+  scene.outputs = {"pin.force"};
+  scene.tolerance = 1e-4;
+  const RunResult few = run_scene(scene, {});
+  scene.bodies[0].modes = 42;
+  scene.bodies[0].geometry.order = 8;
+  scene.error_budget = false;
+  const RunResult many = run_scene(scene, {});
+  const double error = largest(compare_outputs(few.outputs, many.outputs, scene.outputs));
+  EXPECT_GT(few.budget.truncation, 0.7 * error);  // of four modes more alone: 0.44
+  EXPECT_LT(few.budget.truncation, 4 * error);
+}
+
 // A stiff boom that rings undamped: the method by multipliers damps it far faster than asked, and says so.
 TEST(NoBudget, AnUnbalancedMotionIsWarnedOf) {
   Scene scene =
@@ -460,7 +523,7 @@ TEST(BudgetOfAHub, MoreModesHoldTheOwnOnes) {
   boom.modes = 6, boom.shapes = {6};
   for (const auto& [directions, kind] : {std::pair{"hinge-plane", "bending_y"}, {"all", "bending_z"}}) {
     boom.directions = directions;
-    const BodyScene richer = with_more_modes(scene, 4, {}).bodies[0];
+    const BodyScene richer = with_more_modes(scene, {}, {}).bodies[0];
     const ReducedBody own = prepare_body(boom).body, all = prepare_body(richer).body;
     ASSERT_EQ(own.coordinates[0].kind, kind);
     const double square = own.Ke(0, 0) / own.Me(0, 0);

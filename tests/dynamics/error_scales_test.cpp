@@ -7,7 +7,6 @@
 namespace flexboom {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
