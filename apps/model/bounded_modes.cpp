@@ -80,10 +80,9 @@ FrequencyBounds bounds_of(const ModalBasis& m, const ModalBasis& other, double s
 }  // namespace
 
 /// Edges along the boom are singular, and no mesh is refined toward them.
-double slowest_fall(const Model& model) {
+double slowest_fall(const BodyScene& body) {
   constexpr double smooth = 0.5, singular = 0.65;
-  if (!is_solid(model)) return smooth;
-  const BodyScene& body = *model.body;
+  if (body.structure != "solid") return smooth;
   const bool edges = std::ranges::any_of(
       body.geometry.segments, [](const BeamSegment& s) { return std::holds_alternative<RectangularTube>(s.start); });
   return edges || body.solid.slit > 0 ? singular : smooth;
@@ -111,7 +110,7 @@ BoundedModes bounded_modes(Model model, const EigenOptions& options, int threads
   if (!here.model.body) return here;
   here.bounds.how = "there is no finer mesh that is small enough to be compared with";
   const Model start = here.model;
-  const double fall = slowest_fall(start);
+  const double fall = slowest_fall(*start.body);
   for (int i = 1; i <= 1 + most_steps; ++i) {
     std::optional<BoundedModes> next = finer(start, i, options, threads);
     if (!next) return here;

@@ -34,8 +34,8 @@ struct BoundedModes {
   std::optional<bool> met() const;
 };
 
-/// Of the discretisation errors of a model, at most: what is left of them on the next finer mesh.
-double slowest_fall(const Model&);
+/// Of the discretisation errors of a boom, at most: what is left of them on the next finer mesh.
+double slowest_fall(const BodyScene&);
 
 /// Modes of a model, each frequency with a bound from a mesh of the same boom that is one step finer (`refined`).
 ///

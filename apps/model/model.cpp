@@ -86,9 +86,8 @@ Model refined(const Model& model, int steps) {
 }
 
 std::optional<Model> refined_if_bearable(const Model& model, int steps) {
-  constexpr Eigen::Index most_unknowns = 120'000;  // of a solid: three per node
   Model r = refined(model, steps);
-  if (r.mesh.nodes.size() > most_unknowns) return {};
+  if (!is_bearable(r.mesh)) return {};
   return r;
 }
 

@@ -160,6 +160,11 @@ Mesh mesh_of(const BodyScene& b, int refine) {
   return b.structure == "solid" ? solid_mesh(b, refine) : beam_mesh(b.geometry, refine);
 }
 
+bool is_bearable(const Mesh& mesh) {
+  constexpr Eigen::Index most_unknowns = 120'000;  // of a solid: three per node
+  return mesh.nodes.size() <= most_unknowns;
+}
+
 namespace {
 
 PreparedBody with_all_shapes(const BodyScene& b, int refine, const std::filesystem::path& keep) {

@@ -26,6 +26,9 @@ struct PreparedBody {
 /// refines singular rims. @throws InputError where there is no mesh that is so coarse.
 Mesh mesh_of(const BodyScene&, int refine = 0);
 
+/// Has a mesh 120 000 unknowns at most? More take minutes, and more than four gigabytes.
+bool is_bearable(const Mesh&);
+
 /// Geometry -> mesh -> K, M -> basis -> reduced body, or the closed form, or the body that the scene gives.
 /// `refine` raises the polynomial order, for error estimates; of a body from a file it takes the finer elements that
 /// the file has. A solid body is kept in the folder `keep`, if one is given, and read from there as long as what it is

@@ -69,7 +69,7 @@ RicherBodies richer_bodies(const Model& model, const ReductionOptions& options, 
   try {
     if (const std::optional<Model> finer = refined_if_bearable(model, 1)) {
       r.finer_elements = for_comparison(*finer, o, threads);
-      r.error_per_change = 1 / (1 - slowest_fall(model));
+      r.error_per_change = 1 / (1 - slowest_fall(*model.body));
     } else {
       notes.emplace_back("no finer elements are kept for error estimates: they would be too many");
     }

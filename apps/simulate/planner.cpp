@@ -2,6 +2,7 @@
 
 #include "apps/simulate/planner.hpp"
 
+#include "apps/model/prepared_body.hpp"
 #include "apps/simulate/error_budget.hpp"
 #include "fem/base/check.hpp"
 #include "fem/booms/solid_boom.hpp"
@@ -267,7 +268,8 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
   if (truncation >= discretisation) {
     const double before = std::exchange(truncation_, worst->truncation);
     const bool is_far = truncation_ > before / 2 && truncation_ > not_near * scene.tolerance;
-    if (costly_ || hopeless_ || is_far || candidates_ >= most_candidates) return false;
+    const bool stays = truncation_ > 0.9 * before;  // what more modes cannot mend: a direction that is left out
+    if (costly_ || hopeless_ || is_far || stays || candidates_ >= most_candidates) return false;
     candidates_ = std::min(candidates_ + candidates_ / 2, most_candidates);
     note_shown(scene, hooks);
     too_few_ = kept_ + 1;
@@ -279,15 +281,21 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
     if (stopped(hooks)) scene = fewer;
     return !stopped(hooks);
   }
-  plan.push_back(
-      fmt::format("discretisation: {:.1e} in {}; elements of two orders more", worst->discretisation, worst->name));
+  const Scene coarse = scene;
+  constexpr int highest = 12;
   for (const size_t i : open_) {
     BodyScene& b = scene.bodies[i];
-    constexpr int highest = 12;
     if (b.structure == "beam") b.geometry.order = std::min(b.geometry.order + 2, highest);
-    if (b.structure == "solid")
-      if (const auto finer = refined(chosen(b.geometry, b.solid), 2)) b.solid = *finer;
+    if (b.structure != "solid") continue;
+    const auto finer = refined(chosen(b.geometry, b.solid), 1);
+    if (finer) b.solid = *finer;
+    if (!finer || !is_bearable(mesh_of(b, 1))) {  // the budget takes a step more
+      scene = coarse;
+      return false;
+    }
   }
+  plan.push_back(
+      fmt::format("discretisation: {:.1e} in {}; elements of a higher order", worst->discretisation, worst->name));
   return true;
 }
 
