@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <string_view>
 #include <utility>
@@ -54,7 +55,9 @@ BodyScene with_modes_beyond(BodyScene b, int highest, const ModesBeyond& more, c
   b.shapes.clear();
   b.directions = "all";
   b = with_modes(std::move(b), std::max(highest, 2), keep, hooks);
-  const int resolved = prepared(b, 0, keep, hooks).dofs / 2;  // by the elements; of the others nothing is learnt
+  const int dofs = prepared(b, 0, keep, hooks).dofs;
+  // By the elements: of the others nothing is learnt. A closed form has all.
+  const int resolved = dofs > 0 ? dofs / 2 : std::numeric_limits<int>::max();
   for (int i = 1;; i *= 2) {
     const int wanted = std::max(highest, std::min(highest + 2 * i * more.of(0), resolved));
     b = with_modes(std::move(b), wanted, keep, hooks);

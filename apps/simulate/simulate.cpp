@@ -150,6 +150,19 @@ void warn_of_the_balance(const IntegrationSummary& s, RunResult& r) {
                     balances(s), r.scene.tolerance));
 }
 
+/// Modes that bend out of the hinge plane, twist and stretch are left out where the scene says so.
+std::string help_with_truncation(const RunResult& r) {
+  const OutputErrors* worst = r.budget.worst();
+  if (worst == nullptr || !(worst->truncation > r.scene.tolerance / 2)) return "";
+  std::vector<std::string> names;
+  for (const BodyScene& b : r.scene.bodies)
+    if (b.is_boom() && b.structure != "rigid" && b.structure != "eq14" && b.directions != "all")
+      names.push_back(b.name);
+  if (names.empty()) return "";
+  return fmt::format("; {} {} modes of the hinge plane alone, and directions = \"all\" takes the others in",
+                     fmt::join(names, ", "), names.size() == 1 ? "has" : "have");
+}
+
 /// What a user must not overlook.
 void add_warnings(const Run& run, RunResult& r) {
   constexpr double small = 0.1;  // of its length: beyond, shapes are no longer those of a straight body
@@ -167,8 +180,8 @@ void add_warnings(const Run& run, RunResult& r) {
           ? fmt::format("the errors add up to {:.1e}{}", r.budget.total(),
                         r.budget.worst() ? fmt::format(" in {}", description(*r.budget.worst())) : "")
           : fmt::format("{}", fmt::join(r.budget.missing, "; "));
-  r.warnings.push_back(
-      fmt::format("the accuracy wanted, {:.1e}, was not reached or not proven: {}", r.scene.tolerance, why));
+  r.warnings.push_back(fmt::format("the accuracy wanted, {:.1e}, was not reached or not proven: {}{}",
+                                   r.scene.tolerance, why, help_with_truncation(r)));
 }
 
 /// What was flown and what is odd about it.

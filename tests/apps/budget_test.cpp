@@ -144,6 +144,31 @@ TEST_P(Budget, CountsTheStretchOfASlenderBar) {
   }
 }
 
+// Weight along a bar that may only bend in the hinge plane: what would help is said.
+TEST(BudgetOfATree, NamesTheDirectionsThatAreLeftOut) {
+  Scene scene = held_bar("fixed", 9.81, 0, 0.02, 10, 6);
+  const auto is_helped = [](const RunResult& r) {
+    return any_has(r.warnings, "directions = \"all\" takes the others in");
+  };
+  EXPECT_FALSE(is_helped(run_scene(scene, {})));
+  scene.bodies[0].directions = "hinge-plane";
+  EXPECT_TRUE(is_helped(run_scene(scene, {})));
+}
+
+// The closed form has as many modes as one likes.
+TEST(BudgetOfAHub, CountsTheModesThatEq14LeavesOut) {
+  Scene scene = load_scene("sport");
+  scene.duration = 0.3;
+  scene.tolerance = 1e-4;
+  scene.outputs = {"sip.tip"};
+  for (BodyScene& b : scene.bodies) b.structure = "eq14", b.modes = 1, b.modes_auto = false;
+  const RunResult one = run_scene(scene, {});
+  for (BodyScene& b : scene.bodies) b.modes = 10;
+  scene.error_budget = false, scene.tolerance = 1e-8;
+  const double error = largest(compare_outputs(one.outputs, run_scene(scene, {}).outputs, scene.outputs));
+  EXPECT_NEAR(one.budget.truncation, error, 0.3 * error);  // modes beyond the next four take a sixth of it back
+}
+
 // The load of a pin converges as 1 / n: the next four modes show a part of what all others do.
 TEST(BudgetOfATree, CountsWhatManyModesDoToTheLoadOfAJoint) {
   Scene scene = held_bar("hinge", 0, -9.81, 0.006, 1.2, 7);
