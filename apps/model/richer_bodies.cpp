@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 
 namespace flexboom {
@@ -26,12 +27,8 @@ std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions 
                                            int threads) {
   o.select.reset();
   const int given = o.basis.modes;
-  const bool has_statics = o.basis.name == "clamped" && !o.basis.in_plane && model.body && !model.clamped.empty();
-  if (has_statics) {
-    std::vector<std::string>& corrections = o.basis.corrections;
-    for (const std::string& shape : static_shapes_beside(kept, model.clamped))
-      if (std::ranges::find(corrections, shape) == corrections.end()) corrections.push_back(shape);
-  }
+  if (o.basis.name == "clamped" && !o.basis.in_plane && model.body && !model.clamped.empty())
+    std::ranges::copy(static_shapes_beside(kept, model.clamped), std::back_inserter(o.basis.corrections));
   for (int more = 8; more >= 0; more -= 2) {
     o.basis.modes = given + (o.basis.in_plane ? more / 2 : more);
     try {

@@ -49,15 +49,13 @@ std::vector<int> places_of(const BodyScene& b, const PreparedBody& whole, const 
 
 /// The lowest modes of all directions: the `highest` that is kept, and enough beyond those of each kind in `kinds`.
 /// Those of beams go on until some stretch and some twist; where none do, static shapes stand for them.
-BodyScene with_modes_beyond(BodyScene b, int highest, const ModesBeyond& more, const std::map<std::string, int>& kinds,
-                            const std::filesystem::path& keep, const RunHooks& hooks) {
+/// What lies beyond `resolved` the elements do not know.
+BodyScene with_modes_beyond(BodyScene b, int highest, int resolved, const ModesBeyond& more,
+                            const std::map<std::string, int>& kinds, const std::filesystem::path& keep,
+                            const RunHooks& hooks) {
   constexpr int most = 64;
   b.shapes.clear();
   b.directions = "all";
-  b = with_modes(std::move(b), std::max(highest, 2), keep, hooks);
-  const int dofs = prepared(b, 0, keep, hooks).dofs;
-  // By the elements: of the others nothing is learnt. A closed form has all.
-  const int resolved = dofs > 0 ? dofs / 2 : std::numeric_limits<int>::max();
   for (int i = 1;; i *= 2) {
     const int wanted = std::max(highest, std::min(highest + 2 * i * more.of(0), resolved));
     b = with_modes(std::move(b), wanted, keep, hooks);
@@ -82,8 +80,9 @@ BodyScene with_more_of_each_kind(const BodyScene& b, const ModesBeyond& more, co
   own.shapes.clear();
   const std::map<std::string, int> kinds = kinds_of(prepared(b, 0, keep, hooks));
   const PreparedBody whole = prepared(own, 0, keep, hooks);
-  const int highest = in_plane ? 2 * b.modes : b.shapes.empty() ? b.modes : b.shapes.back();
-  BodyScene richer = with_modes_beyond(b, std::max(highest, b.modes), more, kinds, keep, hooks);
+  const int dofs = b.modes > 0 ? whole.dofs : prepared(with_modes(own, 2, keep, hooks), 0, keep, hooks).dofs;
+  const int resolved = dofs > 0 ? dofs / 2 : std::numeric_limits<int>::max();  // a closed form has all
+  BodyScene richer = with_modes_beyond(b, in_plane ? 2 * b.modes : b.modes, resolved, more, kinds, keep, hooks);
   const PreparedBody all = prepared(richer, 0, keep, hooks);
   const std::vector<int> places = places_of(b, whole, all);
   std::map<std::string, int> beside;
@@ -237,15 +236,13 @@ struct Measuring {
     budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
   }
 
-  /// Enters what a repeat has changed in each output, `factor` times, loads `factor_of_loads` times more, and `more` of
-  /// the largest value of each. Returns the largest.
-  double enter(Part part, const std::vector<OutputDifference>& differences, double more = 0, double factor = 1,
-               double factor_of_loads = 1) {
+  /// Enters what a repeat has changed in each output, `factor` times, and `more` of the largest value of each. Returns
+  /// the largest.
+  double enter(Part part, const std::vector<OutputDifference>& differences, double more = 0, double factor = 1) {
     double most = 0;
     for (OutputErrors& o : budget.outputs) {
       const auto d = std::ranges::find(differences, o.name, &OutputDifference::name);
-      const double times = is_load(o.name) ? factor * factor_of_loads : factor;
-      const double error = d == differences.end() ? 0 : times * d->error, before = worst_part(o);
+      const double error = d == differences.end() ? 0 : factor * d->error, before = worst_part(o);
       if (d != differences.end()) o.scale = std::max(o.scale, d->scale), o.size = std::max(o.size, d->size);
       o.*part = error + (o.scale > 0 ? more * o.size / o.scale : 0);
       if (error > before) o.when = d->time;
@@ -328,7 +325,9 @@ double truncation_error(const Run& run, const Scene& flown, const StillKinds& st
     more.tolerance = flown.tolerance;
     differences = change(run, more, 0, m);
   }
-  return m.enter(&OutputErrors::truncation, differences, 0, 1, 2);
+  for (OutputDifference& d : differences)
+    if (is_load(d.name)) d.error *= 2;
+  return m.enter(&OutputErrors::truncation, differences);
 }
 
 /// All that the scene leaves to the program.

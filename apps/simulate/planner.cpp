@@ -281,19 +281,18 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
     if (stopped(hooks)) scene = fewer;
     return !stopped(hooks);
   }
-  const Scene coarse = scene;
+  Scene better = scene;
   constexpr int highest = 12;
   for (const size_t i : open_) {
-    BodyScene& b = scene.bodies[i];
+    BodyScene& b = better.bodies[i];
     if (b.structure == "beam") b.geometry.order = std::min(b.geometry.order + 2, highest);
     if (b.structure != "solid") continue;
     const auto finer = refined(chosen(b.geometry, b.solid), 1);
-    if (finer) b.solid = *finer;
-    if (!finer || !is_bearable(mesh_of(b, 1))) {  // the budget takes a step more
-      scene = coarse;
-      return false;
-    }
+    if (!finer) return false;
+    b.solid = *finer;
+    if (!is_bearable(mesh_of(b, 1))) return false;  // the budget takes a step more
   }
+  scene = std::move(better);
   plan.push_back(
       fmt::format("discretisation: {:.1e} in {}; elements of a higher order", worst->discretisation, worst->name));
   return true;
