@@ -65,7 +65,12 @@ bool Contacts::update(StopMotion& motion, double t, std::vector<StopEvent>& even
     history.largest_gap = std::max(history.largest_gap, std::abs(gap.value));
     if (!stops_[i].is_there) continue;
     const bool slipped = slipped_through(i, gap, motion.noise(i));
-    if (crossed_[i] != 0 || slipped) {
+    if (!armed_[i]) {
+      if (crossed_[i] != 0 || std::max(std::abs(gap.rate) * stops_[i].period, gap.value) > level(i, motion)) {
+        wake(i, gap);
+        changed = true;
+      }
+    } else if (crossed_[i] != 0 || slipped) {
       changed = true;
       if (has_decayed(i, gap, motion)) {
         settle(i, t);
@@ -77,14 +82,15 @@ bool Contacts::update(StopMotion& motion, double t, std::vector<StopEvent>& even
         approach_[i].restart(gap.rate);
         if (approach_[i].of_two_sides() * stops_[i].period < small(i, motion) && !is_pushed(i, motion)) settle(i, t);
       }
-    } else if (!armed_[i] && std::max(std::abs(gap.rate) * stops_[i].period, gap.value) >
-                                 2 * std::max(small(i, motion), asleep_[i])) {
-      wake(i, gap);
-      changed = true;
     }
     approach_[i].observe(gap.value, gap.rate, stops_[i].spring_rate);
   }
   return changed;
+}
+
+double Contacts::level(std::size_t i, const StopMotion& motion) const {
+  if (!stops_[i].is_there) return no_level;
+  return armed_[i] ? 0 : 2 * std::max(small(i, motion), asleep_[i]);
 }
 
 std::vector<StopHistory> Contacts::histories() const {

@@ -3,12 +3,16 @@
 #include "dynamics/events/flight.hpp"
 #include "dynamics/model/multibody.hpp"
 
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace flexboom {
+
+/// The level of a gap that nobody looks at.
+inline constexpr double no_level = std::numeric_limits<double>::infinity();
 
 /// What an event is. `stop`: touches or leaves a spring stop; others are of a JointLaw.
 enum class EventKind : char { stop, kink, engage, disengage, stick, slip, impact, rest, leave, latch };
@@ -81,9 +85,11 @@ class Contacts {
   const Stop& stop(std::size_t i) const { return stops_[i]; }
   double largest_gap(std::size_t i) const { return history_[stops_[i].joint].largest_gap; }
 
-  /// One entry per stop. crossed: +1 where the gap rises through zero, -1 where it falls.
+  /// The gap at which a step must end: zero; of a joint that has settled, where it wakes; `no_level` without a stop.
+  double level(std::size_t i, const StopMotion&) const;
+
+  /// One entry per stop. crossed: +1 where the gap rises through its level, -1 where it falls.
   const std::vector<char>& closed() const { return closed_; }
-  const std::vector<char>& armed() const { return armed_; }
   std::vector<int>& crossed() { return crossed_; }
 
   /// One entry per joint, with what is closed now.

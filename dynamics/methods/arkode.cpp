@@ -116,10 +116,10 @@ class ArkodeStepper final : public Stepper {
       : within_(ode->another(), scale, tables), run_(std::move(ode), scale, tables), start_(run_.problem().size()) {}
 
   void restart(double t, const Eigen::VectorXd& y, std::span<const char> contact,
-               std::span<const char> armed) override {
+               std::span<const double> levels) override {
     run_.problem().set_contacts(contact);
     within_.problem().set_contacts(contact);
-    crossings_.arm(armed);
+    crossings_.watch(levels);
     run_.restart(t, y.data());
     start_ = y;
     start_time_ = t;

@@ -37,9 +37,9 @@ class CvodeStepper final : public Stepper {
   CvodeStepper& operator=(const CvodeStepper&) = delete;
 
   void restart(double t, const Eigen::VectorXd& y, std::span<const char> contact,
-               std::span<const char> armed) override {
+               std::span<const double> levels) override {
     problem_.set_contacts(contact);
-    crossings_.arm(armed);
+    crossings_.watch(levels);
     Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(y_.get()), y.size()) = y;
     if (started_) add_counts(past_);
     started_ = true;

@@ -62,11 +62,11 @@ class ExponentialStepper final : public Stepper {
           "exponential: the tolerance asks for {:.2g} of each step, which is below round-off", scale.tolerance));
   }
 
-  void restart(double t, const VectorXd& y, std::span<const char> contact, std::span<const char> armed) override {
+  void restart(double t, const VectorXd& y, std::span<const char> contact, std::span<const double> levels) override {
     step_.start = t;
     pending_ = false;
     contact_.assign(contact.begin(), contact.end());
-    armed_.assign(armed.begin(), armed.end());
+    levels_.assign(levels.begin(), levels.end());
     step_.linear = &linear_part(y);
     begin(y);
     first_ = true;
@@ -106,7 +106,7 @@ class ExponentialStepper final : public Stepper {
       h_ = std::isfinite(error) ? smaller(error) : on_ladder(step_.length / (rung * rung));
       if (!std::isfinite(error)) relinearise(failures < 6 ? 1e-3 : 1e-9);
     }
-    end_ = search_.first_crossing(step_, contact_, armed_, crossed);
+    end_ = search_.first_crossing(step_, contact_, levels_, crossed);
     if (end_ == 0) {
       y = start_;
     } else if (end_ == 1) {
@@ -446,7 +446,8 @@ class ExponentialStepper final : public Stepper {
   const SplitLayout& layout_;
   const ErrorScale& scale_;
   int nx_;
-  std::vector<char> contact_, armed_;
+  std::vector<char> contact_;
+  std::vector<double> levels_;
   std::vector<int> watched_;  // entries of x that are wanted at every point: angular velocities, gaps and their rates
   std::map<std::vector<char>, std::unique_ptr<LinearPart>> linear_parts_;
   CollocatedStep step_;

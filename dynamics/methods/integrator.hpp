@@ -20,6 +20,7 @@ class SplitProblem;
 
 struct IntegratorOptions : FlightOptions {
   std::string method = "auto";
+  double accuracy = 0;  // what left-out stiffness is held against; 0: the tolerance
   /// Measure errors against the motion since the last event instead of the largest motion: late, tiny contacts keep
   /// their relative accuracy. Costs steps.
   bool rescale_at_events = false;
@@ -62,10 +63,11 @@ void add_counts(const StepCounts&, IntegrationSummary&);
 class Stepper {
  public:
   virtual ~Stepper() = default;
-  /// Starts again at (t, y) with these stops closed. Crossings of hinges with armed[i] != 0 end a step.
+  /// Starts again at (t, y) with these stops closed. A gap that crosses its level ends a step; at an infinite one,
+  /// none.
   virtual void restart(double t, const Eigen::VectorXd& y, std::span<const char> contact,
-                       std::span<const char> armed) = 0;
-  /// One step, not beyond t_end. Fills t and y, and crossed[i] with +1 (gap rises through zero), -1 or 0. When
+                       std::span<const double> levels) = 0;
+  /// One step, not beyond t_end. Fills t and y, and crossed[i] with +1 (gap rises through its level), -1 or 0. When
   /// something was crossed, (t, y) is there.
   virtual void step(double t_end, double& t, Eigen::VectorXd& y, std::span<int> crossed) = 0;
   /// States that the motion may come near until t_end, as far as that is known without flying there: sizes to weigh

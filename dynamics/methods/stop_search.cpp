@@ -10,12 +10,12 @@ namespace flexboom {
 using Eigen::Index;
 
 double StopSearch::first_crossing(const CollocatedStep& step, std::span<const char> contact,
-                                  std::span<const char> armed, std::span<int> crossed) {
+                                  std::span<const double> levels, std::span<int> crossed) {
   roots_.clear();
   double end = 1;
-  for (size_t i = 0; i < armed.size(); ++i) {
-    if (!armed[i]) continue;
-    const double root = first_crossing(step, static_cast<int>(i), contact[i] ? 1 : -1, end);
+  for (size_t i = 0; i < levels.size(); ++i) {
+    if (!std::isfinite(levels[i])) continue;
+    const double root = first_crossing(step, static_cast<int>(i), levels[i], contact[i] ? 1 : -1, end);
     if (root > 1) continue;
     roots_.emplace_back(static_cast<int>(i), root);
     end = std::min(end, root);
@@ -131,7 +131,7 @@ double StopSearch::crossing_at_places(const CollocatedStep& step, const At& at, 
 }
 
 /// The first fraction of the step where the gap leaves the side of its flag, or no_crossing: behind `end` nobody asks.
-double StopSearch::first_crossing(const CollocatedStep& step, int hinge, double side, double end) {
+double StopSearch::first_crossing(const CollocatedStep& step, int hinge, double level, double side, double end) {
   const SplitLayout::Coordinate at_stop = gaps_[static_cast<size_t>(hinge)];
   const int gap = at_stop.value, rate = at_stop.rate;
   const LinearPart& linear = *step.linear;
@@ -139,11 +139,11 @@ double StopSearch::first_crossing(const CollocatedStep& step, int hinge, double 
   const auto at = [&](double c) {
     linear.point(c, step.length, scratch_);
     linear.combine(scratch_, 0, step.Z.col(0), step.M, z_);
-    return Clearance{c, side * linear.of_modes.col(gap).dot(z_),
+    return Clearance{c, side * (linear.of_modes.col(gap).dot(z_) - level),
                      side * step.length * linear.of_modes.col(rate).dot(z_)};
   };
   const auto at_point = [&](int j) {
-    return Clearance{collocation::node(j), side * step.X(gap, j), side * step.length * step.X(rate, j)};
+    return Clearance{collocation::node(j), side * (step.X(gap, j) - level), side * step.length * step.X(rate, j)};
   };
   const Ripple at_start = ripple(step, gap, 0);
   const double resolution = 4e-16 * std::max(1.0, std::abs(step.start) / step.length);

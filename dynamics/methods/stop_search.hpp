@@ -26,9 +26,9 @@ class StopSearch {
  public:
   explicit StopSearch(std::vector<SplitLayout::Coordinate> gaps) : gaps_(std::move(gaps)) {}
 
-  /// The fraction at which the step ends: of the first crossing of an armed stop, or 1. crossed[i]: +1 where the gap of
-  /// hinge i rises through zero there, -1 where it falls.
-  double first_crossing(const CollocatedStep&, std::span<const char> contact, std::span<const char> armed,
+  /// The fraction at which the step ends: of the first gap that crosses its level, or 1; infinite levels are never
+  /// crossed. crossed[i]: +1 where the gap of hinge i rises there, -1 where it falls.
+  double first_crossing(const CollocatedStep&, std::span<const char> contact, std::span<const double> levels,
                         std::span<int> crossed);
 
  private:
@@ -53,7 +53,7 @@ class StopSearch {
 
   /// Of a gap (an entry of x) from a point of the step on; sets `fast_`.
   Ripple ripple(const CollocatedStep&, int gap, int point);
-  double first_crossing(const CollocatedStep&, int hinge, double side, double end);
+  double first_crossing(const CollocatedStep&, int hinge, double level, double side, double end);
 
   struct Places {
     int gap, to;  // entry of x; point at the end

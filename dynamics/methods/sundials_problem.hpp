@@ -60,26 +60,26 @@ class Problem {
 /// Stops that are met or left within a step.
 class StepCrossings {
  public:
-  /// Of hinges with armed[i] != 0.
-  void arm(std::span<const char> armed) { armed_.assign(armed.begin(), armed.end()); }
+  /// Gaps at which a step ends; at an infinite one, none does.
+  void watch(std::span<const double> levels) { levels_.assign(levels.begin(), levels.end()); }
 
   /// The state at the start of a step.
   void begin(const Problem& problem, double t, const double* y) {
-    from_.resize(armed_.size());
-    for (size_t i = 0; i < armed_.size(); ++i)
-      if (armed_[i]) from_[i] = clearance(problem, t, y, i, 0, 1);
+    from_.resize(levels_.size());
+    for (size_t i = 0; i < levels_.size(); ++i)
+      if (std::isfinite(levels_[i])) from_[i] = clearance(problem, t, y, i, 0, 1);
   }
 
   /// The fraction of the step from t that ends at the first crossing, or 1. y: at its end. state_at(c): the state at a
-  /// fraction. crossed[i]: +1 where the gap of hinge i rises through zero there, -1 where it falls, or 0.
+  /// fraction. crossed[i]: +1 where the gap of hinge i rises through its level there, -1 where it falls, or 0.
   template <class StateAt>
   double first(const Problem& problem, double t, double length, const double* y, const StateAt& state_at,
                std::span<int> crossed) {
     std::fill(crossed.begin(), crossed.end(), 0);
     roots_.clear();
     double end = 1;
-    for (size_t i = 0; i < armed_.size(); ++i) {
-      if (!armed_[i]) continue;
+    for (size_t i = 0; i < levels_.size(); ++i) {
+      if (!std::isfinite(levels_[i])) continue;
       const auto at = [&](double c) { return clearance(problem, t + c * length, state_at(c), i, c, length); };
       Clearance from = from_[i];
       from.slope *= length;
@@ -98,18 +98,18 @@ class StepCrossings {
   }
 
  private:
-  /// Of the gap on the side of its flag.
-  static Clearance clearance(const Problem& problem, double t, const double* y, size_t i, double c, double length) {
+  /// Of the gap beyond its level, on the side of its flag.
+  Clearance clearance(const Problem& problem, double t, const double* y, size_t i, double c, double length) const {
     const double side = problem.contacts()[i] ? 1 : -1;
     const int hinge = static_cast<int>(i);
     if (hinge >= problem.ode().stops()) {
       const Gap gap = problem.ode().switch_gap(t, y, hinge);
-      return {c, side * gap.value, side * length * gap.rate};
+      return {c, side * (gap.value - levels_[i]), side * length * gap.rate};
     }
-    return {c, side * problem.ode().gap(y, hinge), side * length * problem.ode().gap_rate(y, hinge)};
+    return {c, side * (problem.ode().gap(y, hinge) - levels_[i]), side * length * problem.ode().gap_rate(y, hinge)};
   }
 
-  std::vector<char> armed_;
+  std::vector<double> levels_;
   std::vector<Clearance> from_;  // slopes per second
   std::vector<std::pair<size_t, double>> roots_;
 };

@@ -98,9 +98,9 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     // Round-off of a gap must not look like a crossing: it counts as on the side of the flag.
     constexpr double round_off = 2e-16;
     for (size_t i = 0; i < contacts_.size(); ++i) {
-      const double g = gap(i, y).value;
+      const double g = gap(i, y).value - levels_[i];
       const double side = contacts_.closed()[i] ? round_off : -round_off;
-      values[i] = !contacts_.armed()[i] ? 1.0 : std::abs(g) <= round_off ? side : g;
+      values[i] = std::isinf(g) ? 1.0 : std::abs(g) <= round_off ? side : g;
     }
     Consistent at(*this, t, y);
     for (size_t i = 0; i < laws_.switches().size(); ++i) {
@@ -314,6 +314,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
 
   void restart() override {
     set_closed(contacts_.closed(), memory_);
+    for (size_t i = 0; i < contacts_.size(); ++i) levels_[i] = contacts_.level(i, *this);
     if (renumbered_) make_method();
     if (t_ > options_.start) {
       equations_.project(t_, y_);
@@ -380,7 +381,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   Clearance clearance(size_t i, const VectorXd& y) {
     const double side = contacts_.closed()[i] ? 1 : -1;
     const DriveMotion<double> g = gap(i, y.data());
-    return {0, side * g.value, side * g.rate};
+    return {0, side * (g.value - levels_[i]), side * g.rate};
   }
 
   /// Of a switch that goes by the way alone; others have no short crossings worth looking for.
@@ -403,7 +404,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       const auto clear = [&](const VectorXd& state) {
         return of_law ? switch_clearance(k, state) : clearance(k, state);
       };
-      if (!(of_law ? laws_.armed()[k] : contacts_.armed()[k]) || !(before_[i].slope < 0)) continue;
+      if (!(of_law ? laws_.armed()[k] != 0 : std::isfinite(levels_[k])) || !(before_[i].slope < 0)) continue;
       Clearance to = clear(y);
       to.c = length;
       if (!(to.slope > 0) || to.value < 0) continue;
@@ -492,8 +493,9 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   const MultipliersOptions& options_;
   double margin_ = 1;
   JointMemory memory_;
-  std::vector<Clearance> before_;  // of the stops and switches, before the step
-  std::vector<int> crossed_;       // the same
+  std::vector<double> levels_ = std::vector<double>(contacts_.size());  // of the stops' gaps, where a step ends
+  std::vector<Clearance> before_;                                       // of the stops and switches, before the step
+  std::vector<int> crossed_;                                            // the same
   bool renumbered_ = false;
   DaeCounts past_;
   VectorXd y_dot_, sample_, rows_, rates_;

@@ -74,6 +74,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
         stepper_(method.make != nullptr ? method.make(ode_of(tree, laws_), scales_.error())
                                         : method.make_split(split(tree), scales_.error())),
         exact_in_linear_part_(method.make_split != nullptr),
+        accuracy_(options.accuracy > 0 ? options.accuracy : options.tolerance),
         pilot_(pilot),
         work_(tree.workspace()),
         has_stiffening_(
@@ -81,7 +82,6 @@ class TreeFlight final : public Flight<TreeTrajectory> {
         effect_(tree.scene().bodies.size()),
         y_dot_(y0.size()),
         flags_(contacts_.closed()),
-        armed_(contacts_.armed()),
         crossed_(contacts_.size() + laws_.switches().size(), 0) {
     y_ = y0;
     result_.summary.method = method.name;
@@ -173,18 +173,18 @@ class TreeFlight final : public Flight<TreeTrajectory> {
 
   /// Stops come before the switches of laws.
   void restart() override {
-    const auto both = [](const std::vector<char>& stops, const std::vector<char>& laws, std::vector<char>& all) {
-      all = stops;
-      all.insert(all.end(), laws.begin(), laws.end());
-    };
-    both(contacts_.closed(), laws_.sides(), flags_), both(contacts_.armed(), laws_.armed(), armed_);
+    flags_ = contacts_.closed();
+    flags_.insert(flags_.end(), laws_.sides().begin(), laws_.sides().end());
+    levels_.clear();
+    for (size_t i = 0; i < contacts_.size(); ++i) levels_.push_back(contacts_.level(i, *this));
+    for (const char armed : laws_.armed()) levels_.push_back(armed ? 0 : no_level);
     const bool starts = t_ == options_.start;
     if (!starts) {
       for (const TreeLayout::Joint& j : tree_.layout().joints)
         if (j.attitude >= 0) y_.segment<4>(j.attitude).normalize();
       scales_.restart(y_);
     }
-    stepper_->restart(t_, y_, flags_, armed_);
+    stepper_->restart(t_, y_, flags_, levels_);
     if (starts) stepper_->predict(options_.duration, [this](const VectorXd& y) { scales_.predict(y); });
   }
   void step(double limit, double& t, VectorXd& y) override {
@@ -245,7 +245,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     s.energy_balance = kept.energy_balance();
     if (is_isolated(tree_.scene())) s.momentum_drift = kept.momentum_drift();
     result_.stiffening_effect = effect_;
-    result_.warnings = stiffening_warnings(tree_.scene(), effect_, options_.duration, options_.tolerance,
+    result_.warnings = stiffening_warnings(tree_.scene(), effect_, options_.duration, accuracy_,
                                            [this](int body) { return tree_.stiffening(body); });
   }
 
@@ -254,6 +254,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   std::unique_ptr<Ode> ode_;
   std::unique_ptr<Stepper> stepper_;
   bool exact_in_linear_part_;
+  double accuracy_;
   double fastest_turn_ = 0;  // of a floating body [rad/s]
   Pilot* pilot_;
   TreeWorkspaceHandle work_;
@@ -261,7 +262,8 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   std::vector<LargestStiffening> effect_;  // per body
   VectorXd y_dot_, blow_;                  // blow: change of the state per impulse
   std::vector<double> hold_of_blow_;       // per joint
-  std::vector<char> flags_, armed_;        // of stops and switches
+  std::vector<char> flags_;                // of stops and switches
+  std::vector<double> levels_;             // of their gaps, where a step ends
   std::vector<int> crossed_;
 };
 

@@ -109,10 +109,11 @@ VectorXd swung(const std::string& name, Unfit& unfit) {
       method->make_split != nullptr
           ? method->make_split(std::make_unique<UnfitSplit>(split(tree), unfit), scales.error())
           : method->make(std::make_unique<UnfitOde>(ode_of(tree, laws), unfit), scales.error());
-  std::vector<char> contact(tree.stops().size(), 0), armed(contact);
+  const std::vector<char> contact(tree.stops().size(), 0);
+  const std::vector<double> levels(contact.size(), no_level);
   std::vector<int> crossed(contact.size());
   double t = 0;
-  for (stepper->restart(t, y, contact, armed); t < 0.02;) stepper->step(0.02, t, y, crossed);
+  for (stepper->restart(t, y, contact, levels); t < 0.02;) stepper->step(0.02, t, y, crossed);
   return y;
 }
 

@@ -82,9 +82,10 @@ struct SearchCase {
   }
 
   double found() {
-    const std::vector<char> contact = {0}, armed = {1};
+    const std::vector<char> contact = {0};
+    const std::vector<double> levels = {0};
     std::vector<int> crossed = {0};
-    const double end = StopSearch({{0, static_cast<int>(n)}}).first_crossing(step, contact, armed, crossed);
+    const double end = StopSearch({{0, static_cast<int>(n)}}).first_crossing(step, contact, levels, crossed);
     return crossed[0] == 0 ? 2 : end;
   }
 };

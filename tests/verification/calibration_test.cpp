@@ -92,6 +92,34 @@ TEST(Calibration, ShakesMoreByCornersThanSmoothly) {
   EXPECT_LT(corners.trajectory.summary.momentum_drift, 1e-6);
 }
 
+/// Booms that came to rest on their stops are pushed into them by the next turn, at any time within a step.
+TEST(Calibration, TheNextTurnFindsTheStopsOfBoomsAtRest) {
+  Scene scene = quarter_turn("trapezoid", false);
+  scene.turns.push_back(scene.turns[0]);
+  scene.turns[1].axis = Vector3d::UnitZ();
+  scene.turns[1].pause = 10;
+  scene.duration = 34;  // the second turn begins after 31.7 s
+  scene.error_budget = false;
+  const auto at = [&](const std::string& formulation, const std::string& method, double tolerance) {
+    Scene other = scene;
+    other.formulation = formulation, other.integrator = method, other.tolerance = tolerance;
+    return run_scene(other, {});
+  };
+  const RunResult exact = at("relative", "exponential", 1e-9);
+  const auto worst = [&](const RunResult& r) {
+    double most = 0;
+    for (const char* name : {"efield_plus.rate", "efield_minus.rate", "sip.rate", "slp.rate"}) {
+      const VectorXd there = column(exact, name);
+      most = std::max(most, (column(r, name) - there).cwiseAbs().maxCoeff() / there.cwiseAbs().maxCoeff());
+    }
+    return most;
+  };
+  constexpr double tolerance = 1e-4;
+  for (const char* method : {"exponential", "adams", "bdf", "dirk"})
+    EXPECT_LT(worst(at("relative", method, tolerance)), 10 * tolerance) << method;
+  EXPECT_LT(worst(at("multipliers", "auto", 1e-5)), 1e-3);  // rates there are differences of larger ones
+}
+
 /// Booms at rest on their stops are no reason for steps without end, whatever the tolerance.
 TEST(Calibration, TightToleranceDoesNotChatter) {
   Scene scene = quarter_turn("smooth", false);
