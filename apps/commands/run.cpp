@@ -98,9 +98,11 @@ void override_modes(Scene& scene, const std::string& text) {
   }
 }
 
-/// Bodies get the modes, elements and stiffening that they have in another scene of the same bodies.
+/// Bodies get the modes, elements and stiffening that they have in another scene of the same bodies, and the integrator
+/// the tolerance that it has there.
 void take_plan(Scene& scene, const std::filesystem::path& from) {
   const Scene planned = load_scene((std::filesystem::is_directory(from) ? from / "scene.toml" : from).string());
+  if (planned.step_tolerance() < scene.tolerance) scene.integrator_tolerance = planned.step_tolerance();
   for (BodyScene& b : scene.bodies) {
     if (!b.is_boom()) continue;
     const auto p = std::ranges::find(planned.bodies, b.name, &BodyScene::name);

@@ -13,10 +13,14 @@
 #include "reduction/invariants/eq14.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -187,16 +191,62 @@ PreparedBody with_all_shapes(const BodyScene& b, int refine, const std::filesyst
   return r;
 }
 
+/// The response of a body to a unit of the load that a static shape is of, n; empty where nobody knows the load.
+VectorXd response(const ReducedBody& body, const Coordinate& load) {
+  constexpr std::string_view axes = "xyz";
+  const auto at = std::ranges::find(body.markers, load.interface, &Marker::name);
+  if (at == body.markers.end() || load.direction.size() != 2 || body.Ke.diagonal().minCoeff() <= 0) return {};
+  const auto axis = static_cast<Eigen::Index>(axes.find(load.direction[1]));
+  const Eigen::Matrix3Xd& S = load.direction[0] == 'F' ? at->S : at->S_theta;
+  return (S.row(axis).transpose().array() / body.Ke.diagonal().array()).matrix();
+}
+
+/// Some of the modes, and of each static shape what these modes leave of its deflection: the whole body has the rest of
+/// it in modes that are not chosen. Its coordinates are orthogonal, modes first.
+ReducedBody with_chosen_modes(const ReducedBody& whole, const std::vector<int>& chosen, int modes) {
+  const int statics = whole.n() - modes;
+  MatrixXd rest(whole.n(), statics);
+  for (int k = 0; k < statics; ++k) {
+    const VectorXd r = response(whole, whole.coordinates[static_cast<size_t>(modes + k)]);
+    if (r.size() == 0) {
+      rest.col(k) = VectorXd::Unit(whole.n(), modes + k);
+      continue;
+    }
+    rest.col(k) = r;
+    rest(chosen, k).setZero();
+    rest.col(k) /= std::sqrt(rest.col(k).dot(whole.Me * rest.col(k)));
+  }
+  std::vector<Coordinate> coordinates;
+  MatrixXd T = MatrixXd::Zero(whole.n(), std::ssize(chosen) + statics);
+  for (const int k : chosen) {
+    T(k, std::ssize(coordinates)) = 1;
+    coordinates.push_back(whole.coordinates[static_cast<size_t>(k)]);
+  }
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> ritz(rest.transpose() * whole.Ke * rest,
+                                                                rest.transpose() * whole.Me * rest);
+  T.rightCols(statics) = rest * ritz.eigenvectors();
+  for (int k = 0; k < statics; ++k) {
+    coordinates.push_back(whole.coordinates[static_cast<size_t>(modes + k)]);
+    coordinates.back().frequency_hz = std::sqrt(ritz.eigenvalues()[k]) / (2 * std::numbers::pi);
+  }
+  return combined(whole, T, std::move(coordinates));
+}
+
 PreparedBody with_shapes(PreparedBody p, const BodyScene& b) {
   if (b.shapes.empty() || b.structure == "rigid") return p;
   std::vector<int> list;
   for (const int k : b.shapes) list.push_back(k - 1);
-  p.body = selected(p.body, list);
+  const int modes = p.coordinates_of_modes();
+  p.body = p.body.n() > modes ? with_chosen_modes(p.body, list, modes) : selected(p.body, list);
   p.shapes = b.shapes;
   return p;
 }
 
 }  // namespace
+
+int PreparedBody::coordinates_of_modes() const {
+  return body.n() - static_cast<int>(std::ranges::count(body.coordinates, "attachment", &Coordinate::kind));
+}
 
 PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem::path& keep) {
   return with_shapes(with_all_shapes(b, refine, keep), b);

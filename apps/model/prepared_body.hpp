@@ -20,6 +20,9 @@ struct PreparedBody {
   std::vector<BodyCheck> checks;   // empty in closed form
   std::vector<std::string> notes;  // what the basis has to say
   std::filesystem::path kept;      // the file that later runs read it from; empty: none
+
+  /// Coordinates but the static shapes of unit loads, which are the last.
+  int coordinates_of_modes() const;
 };
 
 /// Elements of a boom. `refine` raises their order, or where that is the highest makes them smaller; of solids it also

@@ -3,12 +3,12 @@
 #include "apps/model/richer_bodies.hpp"
 
 #include "apps/model/bounded_modes.hpp"
+#include "apps/model/static_shapes.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <iterator>
 #include <optional>
 
 namespace flexboom {
@@ -28,7 +28,9 @@ std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions 
   o.select.reset();
   const int given = o.basis.modes;
   if (o.basis.name == "clamped" && !o.basis.in_plane && model.body && !model.clamped.empty())
-    std::ranges::copy(static_shapes_beside(kept, model.clamped), std::back_inserter(o.basis.corrections));
+    for (const std::string& shape : static_shapes_at(model.clamped == "tip" ? "root" : "tip"))
+      if (std::ranges::find(o.basis.corrections, shape) == o.basis.corrections.end())
+        o.basis.corrections.push_back(shape);
   for (int more = 8; more >= 0; more -= 2) {
     o.basis.modes = given + (o.basis.in_plane ? more / 2 : more);
     try {
@@ -42,17 +44,6 @@ std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions 
 }
 
 }  // namespace
-
-std::vector<std::string> static_shapes_beside(const ReducedBody& body, const std::string& clamped) {
-  const auto has = [&](const char* kind) {
-    return std::ranges::find(body.coordinates, kind, &Coordinate::kind) != body.coordinates.end();
-  };
-  const std::string end = clamped == "tip" ? "root" : "tip";
-  std::vector<std::string> shapes;
-  if (!has("axial")) shapes.push_back(end + ".Fx");
-  if (!has("torsion")) shapes.push_back(end + ".Mx");
-  return shapes;
-}
 
 RicherBodies richer_bodies(const Model& model, const ReductionOptions& options, const ReducedBody& kept,
                            const std::string& errors, int threads, std::vector<std::string>& notes) {

@@ -98,14 +98,16 @@ struct OrbitScene {
 /// Everything `flexboom run` needs. Defaults are the values a file may leave out.
 struct Scene {
   std::string name;
-  double duration = 10;               // [s]
-  double output_step = 0.01;          // [s]
-  double vtu_step = 0;                // [s]; 0: no VTU files
-  double tolerance = 1e-6;            // [accuracy] tolerance
+  double duration = 10;       // [s]
+  double output_step = 0.01;  // [s]
+  double vtu_step = 0;        // [s]; 0: no VTU files
+  double tolerance = 1e-6;    // [accuracy] tolerance
+  double step_tolerance() const { return integrator_tolerance > 0 ? integrator_tolerance : tolerance; }
   std::vector<std::string> outputs;   // [accuracy] outputs; empty: all
   std::vector<std::string> absolute;  // [accuracy] absolute: errors that do not count, "1e-9 rad"
   bool error_budget = true;  // [accuracy] budget: repeat the run with a finer everything and print the differences
   std::string integrator = "auto";       // [integrator] method; "auto": what suits the scene
+  double integrator_tolerance = 0;       // [integrator] tolerance; 0: that of [accuracy]
   std::string formulation = "relative";  // [integrator] formulation
   double settle = -1;                    // [integrator] settle, IntegratorOptions::settle
   bool rescale_at_events = false;

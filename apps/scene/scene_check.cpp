@@ -50,6 +50,10 @@ void check_times(Faults& faults, const Scene& scene) {
 }
 
 void check_accuracy(Faults& faults, const Scene& scene) {
+  if (scene.integrator_tolerance > scene.tolerance)
+    faults.add("integrator.tolerance",
+               fmt::format("is {:g}, looser than the accuracy wanted, {:g}; make it no more than that, or leave it out",
+                           scene.integrator_tolerance, scene.tolerance));
   const std::vector<std::string> known = outputs_of(with_joints(scene));
   const std::vector<std::string_view> names(known.begin(), known.end());
   if (!body_names_known(faults, scene)) return;

@@ -41,6 +41,10 @@ void tolerance(Faults& faults, const std::string& path, const double& value, std
                            value, least));
 }
 
+void integrator_tolerance(Faults& faults, const std::string& path, const double& value, std::string_view unit) {
+  if (value != 0) tolerance(faults, path, value, unit);
+}
+
 void settle(Faults& faults, const std::string& path, const double& value, std::string_view) {
   if (!(std::isfinite(value) && value < 1))
     faults.add(path,
@@ -93,6 +97,8 @@ void integrator_keys(Archive& a, Scene& s) {
          "`\"exponential\"`, `\"bdf\"`, `\"adams\"`, `\"dirk\"` or `\"erk\"`; with multipliers `\"ida\"`; `\"auto\"`: "
          "chosen by the program, and the plan says why"},
         s.integrator);
+  a.key({"tolerance", "", "relative error of the motion, no more than that of the outputs; 0: the same"},
+        s.integrator_tolerance, integrator_tolerance);
   a.choice({"formulation", "", "coordinates"}, formulations, s.formulation);
   a.key({"settle", "",
          "fraction of its largest rate below which a hinge rests at its stop; 0: never, negative: a hundredth of the "

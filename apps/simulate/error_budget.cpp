@@ -2,14 +2,13 @@
 
 #include "apps/model/bounded_modes.hpp"
 #include "apps/model/prepared_body.hpp"
-#include "apps/model/richer_bodies.hpp"
+#include "apps/model/static_shapes.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <string_view>
@@ -26,7 +25,7 @@ bool has(const BodyScene& b, Richer richer) { return b.richer && ((*b.richer).*r
 
 std::map<std::string, int> kinds_of(const PreparedBody& p) {
   std::map<std::string, int> kinds;
-  for (const Coordinate& c : p.body.coordinates) ++kinds[c.kind];
+  for (int k = 0; k < p.coordinates_of_modes(); ++k) ++kinds[p.body.coordinates[static_cast<size_t>(k)].kind];
   return kinds;
 }
 
@@ -66,9 +65,7 @@ BodyScene with_modes_beyond(BodyScene b, int highest, int resolved, const ModesB
     const std::vector<std::string> statics = static_shapes_beside(all.body, b.clamp);
     const bool has_more = b.modes == wanted && wanted < std::min(highest + most, resolved);
     if (has_more && (!enough || (b.structure == "beam" && !statics.empty()))) continue;
-    if (b.structure == "beam" || b.structure == "solid")
-      std::ranges::copy(statics, std::back_inserter(b.basis.corrections));
-    return b;
+    return b.structure == "beam" || b.structure == "solid" ? with_static_shapes(std::move(b), statics) : b;
   }
 }
 
@@ -86,15 +83,13 @@ BodyScene with_more_of_each_kind(const BodyScene& b, const ModesBeyond& more, co
   const PreparedBody all = prepared(richer, 0, keep, hooks);
   const std::vector<int> places = places_of(b, whole, all);
   std::map<std::string, int> beside;
-  for (int k = 1; k <= all.body.n(); ++k) {
+  for (int k = 1; k <= all.coordinates_of_modes(); ++k) {
     const std::string& kind = all.body.coordinates[static_cast<size_t>(k) - 1].kind;
-    const bool is_static = k > richer.modes;
     const auto own_kind = kinds.find(kind);
     const int of_kind = own_kind != kinds.end() ? more.of(own_kind->second)
                         : kinds.empty()         ? more.of(0)
                                                 : more.of(0) / 2;
-    if (is_static || std::ranges::find(places, k) != places.end() || ++beside[kind] <= of_kind)
-      richer.shapes.push_back(k);
+    if (std::ranges::find(places, k) != places.end() || ++beside[kind] <= of_kind) richer.shapes.push_back(k);
   }
   return richer;
 }
@@ -126,6 +121,8 @@ Scene with_more_modes(Scene scene, const ModesBeyond& more, const RunHooks& hook
     if (b.structure == "rigid" || !b.is_boom()) continue;
     if (b.basis.name == "clamped") {
       b = with_more_of_each_kind(b, more, scene.bodies_kept_in, hooks);
+      if (b.structure == "beam" || b.structure == "solid")
+        b = with_static_shapes(std::move(b), static_shapes_of_loads(scene, b));
       continue;
     }
     const int per_plane = b.directions == "all" ? (b.modes + 1) / 2 : b.modes;
@@ -144,10 +141,11 @@ Scene without_kinds(Scene scene, const StillKinds& still, const RunHooks& hooks)
     if (kinds == still.end() || kinds->second.empty()) continue;
     const PreparedBody p = prepared(b, 0, scene.bodies_kept_in, hooks);
     std::vector<int> moving;
-    for (size_t k = 0; k < p.body.coordinates.size(); ++k)
+    const auto modes = static_cast<size_t>(p.coordinates_of_modes());
+    for (size_t k = 0; k < modes; ++k)
       if (!kinds->second.contains(p.body.coordinates[k].kind))
         moving.push_back(p.shapes.empty() ? static_cast<int>(k) + 1 : p.shapes[k]);
-    if (moving.size() == p.body.coordinates.size()) continue;
+    if (moving.size() == modes) continue;
     b.shapes = std::move(moving);
     if (b.shapes.empty()) b.modes = 0;
   }
@@ -271,26 +269,12 @@ struct Measuring {
   }
 };
 
-/// Repeats the run ten times tighter until the difference is within a third of the tolerance, for there are other
-/// errors; the tighter run then takes its place. Returns the difference. `flown` is the scene of the run that was kept.
-double settle_time_error(const Scene& scene, Scene& flown, Run& run, Measuring& m) {
-  constexpr int most = 3;
-  for (int i = 1;; ++i) {
-    Scene tight = flown;
-    tight.tolerance /= 10;
-    Run finer = run_once(tight, m.hooks);
-    const std::vector<OutputDifference> differences =
-        compare_outputs(run.outputs, finer.outputs, scene.outputs, m.floors);
-    const double error = largest(differences);
-    if (error <= scene.tolerance / 3 || i == most || m.stopped() || tight.tolerance < 1e-13)
-      return m.enter(&OutputErrors::time, differences);
-    run = std::move(finer);
-    flown = tight;
-    m.plan.push_back(fmt::format(
-        "time integration: changed by {:.1e} at a tenth of the tolerance, so that run is the one kept (integrator "
-        "tolerance {:.0e})",
-        error, tight.tolerance));
-  }
+constexpr double least_tolerance = 1e-13;  // of a flight in comparison: below is round-off
+
+/// A digit more from the integrator.
+Scene with_a_digit_more(Scene scene) {
+  scene.integrator_tolerance = scene.step_tolerance() / 10;
+  return scene;
 }
 
 /// Another flight at a bearable cost.
@@ -309,8 +293,7 @@ std::vector<OutputDifference> change(const Run& run, Scene other, int refine, co
   std::vector<OutputDifference> differences = difference(run, repeated(run, other, refine, m), other, m);
   const double most = largest(differences) / m.floors.tolerance;
   if (!(most > counts && most < beyond_doubt) || m.stopped()) return differences;
-  other.tolerance /= 10;
-  return difference(run, repeated(run, other, refine, m), other, m);
+  return difference(run, repeated(run, with_a_digit_more(other), refine, m), other, m);
 }
 
 /// The modes left out, first with few digits: more only where the answer would drown in the error of time integration.
@@ -319,9 +302,11 @@ std::vector<OutputDifference> change(const Run& run, Scene other, int refine, co
 double truncation_error(const Run& run, const Scene& flown, const StillKinds& still, Measuring& m) {
   const bool loads = std::ranges::any_of(m.budget.outputs, is_load, &OutputErrors::name);
   Scene more = without_kinds(with_more_modes(flown, {.as_many = loads}, m.hooks), still, m.hooks);
-  more.tolerance = std::max(flown.tolerance, 1e-5);
+  constexpr double few_digits = 1e-5;
+  const bool has_many = flown.integrator_tolerance == 0 && flown.tolerance < few_digits;
+  if (has_many) more.tolerance = few_digits;
   std::vector<OutputDifference> differences = change(run, more, 0, m);
-  if (more.tolerance != flown.tolerance && largest(differences) <= 10 * more.tolerance) {
+  if (has_many && largest(differences) <= 10 * few_digits) {
     more.tolerance = flown.tolerance;
     differences = change(run, more, 0, m);
   }
@@ -402,7 +387,25 @@ OutputFloors floors_of(const Scene& scene, const std::vector<PreparedBody>& bodi
   return floors;
 }
 
-ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan,
+std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors& floors, int digits,
+                                                const RunHooks& hooks, std::vector<std::string>& plan) {
+  for (;; --digits) {
+    const Scene tight = with_a_digit_more(flown);
+    Run finer = run_once(tight, hooks);
+    std::vector<OutputDifference> differences = compare_outputs(run.outputs, finer.outputs, flown.outputs, floors);
+    const double error = largest(differences);
+    const bool is_stopped = hooks.interrupt != nullptr && hooks.interrupt->load();
+    if (error <= flown.tolerance / 3 || digits == 0 || is_stopped || tight.step_tolerance() < least_tolerance)
+      return differences;
+    plan.push_back(fmt::format(
+        "time integration: changed by {:.1e} at a tenth of the tolerance {:.0e}; the integrator gets {:.0e}", error,
+        flown.step_tolerance(), tight.step_tolerance()));
+    run = std::move(finer);
+    flown = tight;
+  }
+}
+
+ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan,
                            const StillKinds& still) {
   Measuring m{hooks, plan, floors_of(scene, run.bodies)};
   ErrorBudget& budget = m.budget;
@@ -418,7 +421,12 @@ ErrorBudget measure_budget(const Scene& scene, Run& run, const RunHooks& hooks, 
     if (b != nullptr) m.missing(part, fmt::format("body {} was reduced before, and its file has no {}", b->name, what));
     return b != nullptr;
   };
-  if (!m.stopped()) budget.time = m.measured("time", [&] { return settle_time_error(scene, flown, run, m); });
+  if (!m.stopped())
+    budget.time = m.measured("time", [&] {
+      constexpr int digits = 2;
+      return m.enter(&OutputErrors::time, settle_time_error(flown, run, m.floors, digits, m.hooks, m.plan));
+    });
+  scene.integrator_tolerance = flown.integrator_tolerance;
   const auto none = [&m](Part part) { return m.enter(part, {}); };
   const bool elastic = any_elastic(scene);
   if (!m.stopped() && !is_missing("truncation", &RicherBodies::more_modes, "more modes")) {

@@ -19,11 +19,17 @@ using StillKinds = std::map<std::string, std::set<std::string>>;
 /// Without modes of these kinds. @throws InputError, NumericalError as prepare_body, of the bodies that have such.
 Scene without_kinds(Scene, const StillKinds&, const RunHooks&);
 
-/// Repeats a run with a tighter tolerance, more modes in and out of the hinge plane, and a finer mesh, and compares the
-/// outputs wanted. When the tighter run differs by more than the tolerance it takes the place of `run`, and `plan` says
-/// so. What is known not to move is no part of more modes.
+/// Repeats a run ten times tighter until its outputs change by no more than a third of the accuracy wanted, for there
+/// are other errors: so many digits more at most. `run` is then the last but one, `flown` has the tolerance of its
+/// integrator, and `plan` says so. Returns the last differences. @throws InputError, NumericalError as run_scene.
+std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors&, int digits,
+                                                const RunHooks&, std::vector<std::string>& plan);
+
+/// Repeats a run with a tighter integrator, more modes in and out of the hinge plane, and a finer mesh, and compares
+/// the outputs wanted. Where the integrator has to be tighter, that run takes the place of `run`, and the scene gets
+/// its tolerance. What is known not to move is no part of more modes.
 /// @throws InputError, NumericalError as run_scene.
-ErrorBudget measure_budget(const Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan,
+ErrorBudget measure_budget(Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan,
                            const StillKinds& still = {});
 
 /// With as many modes as the elements have, `wanted` at most.

@@ -3,6 +3,7 @@
 #include "apps/simulate/planner.hpp"
 
 #include "apps/model/prepared_body.hpp"
+#include "apps/model/static_shapes.hpp"
 #include "apps/simulate/error_budget.hpp"
 #include "fem/base/check.hpp"
 #include "fem/booms/solid_boom.hpp"
@@ -16,6 +17,7 @@
 #include <iterator>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 namespace flexboom {
@@ -70,6 +72,8 @@ Scene Planner::with_candidates(const Scene& scene, int candidates, int made, con
     int modes = wanted;
     if (b.basis.name == "clamped") modes = made / share + (scene.error_budget ? for_budget : 0);
     b = with_modes(b, modes, scene.bodies_kept_in, hooks);
+    if (b.basis.name == "clamped" && (b.structure == "beam" || b.structure == "solid"))
+      b = with_static_shapes(std::move(b), moving_static_shapes(scene, b));
     const auto shown = candidates < made ? shown_.end() : shown_.find(b.name);
     if (shown != shown_.end()) b.modes = std::max(b.modes, shown->second.modes);
     if (b.modes <= wanted) continue;
@@ -79,6 +83,18 @@ Scene Planner::with_candidates(const Scene& scene, int candidates, int made, con
     std::ranges::copy_if(shown->second.shapes, std::back_inserter(b.shapes), [&](int k) { return k > wanted; });
   }
   return without_kinds(all, still_, hooks);
+}
+
+std::vector<std::string> Planner::moving_static_shapes(const Scene& scene, const BodyScene& body) const {
+  std::vector<std::string> shapes = static_shapes_of_loads(scene, body);
+  const auto still = still_.find(body.name);
+  if (still == still_.end()) return shapes;
+  const std::map<std::string, std::string> moves = {{"Fx", "axial"},   {"Fy", "bending_y"}, {"Fz", "bending_z"},
+                                                    {"Mx", "torsion"}, {"My", "bending_z"}, {"Mz", "bending_y"}};
+  std::erase_if(shapes, [&](const std::string& shape) {
+    return still->second.contains(moves.at(shape.substr(shape.rfind('.') + 1)));
+  });
+  return shapes;
 }
 
 /// Only clamped modes are independent of each other; other bases are whole.
@@ -93,7 +109,7 @@ std::vector<Planner::Candidate> Planner::ranked(const Scene& scene, const Run& r
   for (const PreparedBody& p : run.bodies) {
     if (p.body.n() == 0 || !has_choice(scene, p.body.name)) continue;
     const VectorXd q = amplitudes(run, p.body);
-    for (int k = 0; k < p.body.n(); ++k)
+    for (int k = 0; k < p.coordinates_of_modes(); ++k)  // behind them are static shapes, which are no candidates
       list.push_back({p.body.name, p.shapes.empty() ? k + 1 : p.shapes[static_cast<size_t>(k)],
                       p.body.coordinates[static_cast<size_t>(k)].kind, q[k] * std::sqrt(p.body.Me(k, k) / p.body.m)});
   }
@@ -117,8 +133,7 @@ void Planner::note_shown(const Scene& planned, const RunHooks& hooks) {
   const Scene more = with_more_modes(planned, {}, hooks);
   for (const size_t i : open_) {
     if (planned.bodies[i].basis.name != "clamped" || planned.bodies[i].directions != "all") continue;
-    BodyScene& shown = shown_[planned.bodies[i].name] = more.bodies[i];
-    std::erase_if(shown.shapes, [&](int k) { return k > shown.modes; });  // static shapes are no candidates
+    shown_[planned.bodies[i].name] = more.bodies[i];
   }
 }
 
@@ -136,60 +151,78 @@ Scene Planner::with_first(const Scene& all, const std::vector<Candidate>& list, 
   return scene;
 }
 
-Run Planner::with_all(const Scene& scene, const RunHooks& hooks, Scene& open, Scene& all,
-                      std::vector<std::string>& plan) {
-  const Run few = run_once(with_candidates(scene, fewest, candidates_, hooks), hooks);
+std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene& open, Scene& all,
+                                     std::vector<std::string>& plan) {
+  Scene with_few = with_candidates(scene, fewest, candidates_, hooks);
+  Run few = run_once(with_few, hooks);
+  if (!std::exchange(is_timed_, true)) {
+    constexpr int digits = 6;
+    settle_time_error(with_few, few, floors_of(scene, few.bodies), digits, hooks, plan);
+    scene.integrator_tolerance = with_few.integrator_tolerance;
+  }
   const auto run = [&](int candidates, long max_steps) {
     open = with_candidates(scene, candidates, candidates, hooks);
     all = as_flown(open, few);
-    all.tolerance = std::max(scene.tolerance / 10, 1e-13);  // its errors are no part of the differences
+    all.integrator_tolerance = std::max(scene.step_tolerance() / 10, 1e-13);  // its errors are no part of differences
     return run_once(all, hooks, 0, max_steps);
   };
   const long bearable = 2 * bearable_steps(few);  // of a tighter tolerance
   for (; candidates_ > fewest && !stopped(hooks); candidates_ /= 2) {
     try {
-      return run(candidates_, bearable);
+      Run made = run(candidates_, bearable);
+      costly_ = costly_ || made.motion.summary.steps > bearable / 3;  // with more of them it will not be bearable
+      return made;
     } catch (const NumericalError&) {
       costly_ = true;
       plan.push_back(
           fmt::format("modes: a run with {} of each body fails or takes more than {} steps", candidates_, bearable));
+      if (candidates_ / 2 <= chosen_from_) return {};
     }
   }
   return run(fewest, 0);
 }
 
-void Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
-  if (open_.empty()) return;
-  const Scene given = scene;
+bool Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
+  if (open_.empty()) return false;
+  Scene given = scene;
+  bool has_chosen = false;
   std::vector<std::string> words;
   // The budget shows what the candidates leave out, unless that is clear before. Without it they are enough where fewer
   // of them are.
   for (int step = 0;; ++step) {
-    scene = given, words.clear();
-    const Choice choice = choose_among_candidates(scene, hooks, words);
+    Scene other = given;
+    words.clear();
+    const std::optional<Choice> choice = choose_among_candidates(other, hooks, words);
     plan.insert(plan.end(), words.begin(), words.end());
-    const bool is_enough = choice.needed < (given.error_budget ? nearly_all : 1);
-    hopeless_ = given.error_budget && !is_enough && choice.error_of_fewer > not_near * scene.tolerance;
-    if (is_enough || stopped(hooks)) return;
+    if (!choice) break;
+    scene = std::move(other), has_chosen = true;
+    given.integrator_tolerance = scene.integrator_tolerance;
+    const bool is_enough = choice->needed < (given.error_budget ? nearly_all : 1);
+    hopeless_ = given.error_budget && !is_enough && choice->error_of_fewer > not_near * scene.tolerance;
+    if (is_enough || stopped(hooks)) return true;
     if (step == most_doublings || costly_ || hopeless_ || 2 * candidates_ > most_candidates) break;
     candidates_ *= 2;
     plan.push_back(
         fmt::format("modes: {:.0f} % of those that move are needed; they are chosen again, from {} of each body",
-                    100 * choice.needed, candidates_));
+                    100 * choice->needed, candidates_));
   }
-  if (given.error_budget) return;
+  if (given.error_budget) return has_chosen;
   scene.warnings.push_back(
       fmt::format("the modes may be too few for {:.1e}: all of the {} of each body that move are needed, and the error "
                   "budget is off",
-                  scene.tolerance, candidates_));
+                  scene.tolerance, chosen_from_));
+  return has_chosen;
 }
 
-Planner::Choice Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
+std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, const RunHooks& hooks,
+                                                                std::vector<std::string>& plan) {
   Scene open, all;
-  const Run reference = with_all(scene, hooks, open, all, plan);
-  const OutputTable wanted = without_coordinates(reference.outputs);
-  const OutputFloors floors = floors_of(scene, reference.bodies);
-  const std::vector<Candidate> list = ranked(all, reference);
+  const std::optional<Run> reference = with_all(scene, hooks, open, all, plan);
+  if (!reference) return {};
+  chosen_from_ = candidates_;
+  const OutputTable wanted = without_coordinates(reference->outputs);
+  const OutputFloors floors = floors_of(scene, reference->bodies);
+  const std::vector<Candidate> list = ranked(all, *reference);
   note_still(list);
   const auto moving_by = [&](double share) {
     return static_cast<size_t>(std::ranges::count_if(
@@ -197,7 +230,7 @@ Planner::Choice Planner::choose_among_candidates(Scene& scene, const RunHooks& h
   };
   const auto error_with = [&](size_t count) {
     try {
-      const Run run = run_once(with_first(all, list, count), hooks, 0, bearable_steps(reference));
+      const Run run = run_once(with_first(all, list, count), hooks, 0, bearable_steps(*reference));
       return largest(compare_outputs(without_coordinates(run.outputs), wanted, scene.outputs, floors));
     } catch (const NumericalError&) {
       return unknown;
@@ -253,7 +286,7 @@ Planner::Choice Planner::choose_among_candidates(Scene& scene, const RunHooks& h
         b.name, counted(taken), taken.size() + small.size() + still.size(), counted(still), counted(small), error,
         fewer_kinds ? fmt::format("; no more of {}, which nothing moved", fmt::join(known_still->second, ", ")) : ""));
   }
-  return {moved > 0 ? static_cast<double>(enough) / static_cast<double>(moved) : 0, error_of_fewer};
+  return Choice{moved > 0 ? static_cast<double>(enough) / static_cast<double>(moved) : 0, error_of_fewer};
 }
 
 bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {
@@ -263,7 +296,8 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
     return false;
   const auto known = [](double part) { return std::isnan(part) ? 0 : part; };
   const double truncation = known(worst->truncation), discretisation = known(worst->discretisation);
-  const double others = std::max(known(worst->time), known(worst->linearisation));
+  // A repeat has an error of time of its own: what is no more than that and the run's together is no truncation.
+  const double others = std::max(2 * known(worst->time), known(worst->linearisation));
   if (worst->known() <= scene.tolerance || std::max(truncation, discretisation) <= others) return false;
   if (truncation >= discretisation) {
     const double before = std::exchange(truncation_, worst->truncation);
@@ -277,9 +311,9 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
                                worst->truncation, worst->name, candidates_));
     const Scene fewer = scene;
     for (const size_t i : open_) scene.bodies[i].modes_auto = true;
-    choose(scene, hooks, plan);
-    if (stopped(hooks)) scene = fewer;
-    return !stopped(hooks);
+    const bool has_chosen = choose(scene, hooks, plan) && !stopped(hooks);
+    if (!has_chosen) scene = fewer;
+    return has_chosen;
   }
   Scene better = scene;
   constexpr int highest = 12;

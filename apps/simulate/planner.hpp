@@ -4,6 +4,7 @@
 #include "apps/simulate/simulate.hpp"
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,9 +18,10 @@ class Planner {
 
   /// Candidates that no motion reaches are left out; of the others, the fewest that move most and are enough. Where the
   /// scene has no budget and all are needed, there are twice as many; where that ends, the scene gets a warning.
-  /// Afterwards no body of the scene is left open. `plan` gets one line per body.
+  /// Afterwards no body of the scene is left open. `plan` gets one line per body. False:
+  /// there was nothing to choose, or more candidates than the last time are not bearable.
   /// @throws InputError, NumericalError as run_once, of the candidates.
-  void choose(Scene&, const RunHooks&, std::vector<std::string>& plan);
+  bool choose(Scene&, const RunHooks&, std::vector<std::string>& plan);
 
   /// A better model where the largest part of the budget's worst output is truncation (more candidates) or
   /// discretisation (finer elements). False: the budget is met, or what stops it is not for a plan to mend: another
@@ -42,12 +44,16 @@ class Planner {
     double needed = 0;          // part of those that move
     double error_of_fewer = 0;  // of the most that are not enough
   };
-  Choice choose_among_candidates(Scene&, const RunHooks&, std::vector<std::string>& plan);
+  std::optional<Choice> choose_among_candidates(Scene&, const RunHooks&, std::vector<std::string>& plan);
   /// Clamped bodies take theirs from so many that are `made`, and some for the budget: once for all runs.
   Scene with_candidates(const Scene&, int candidates, int made, const RunHooks&) const;
+  /// Static shapes of the loads on a boom, of kinds that move.
+  std::vector<std::string> moving_static_shapes(const Scene&, const BodyScene&) const;
   /// The run that the others are compared with, as precise as that takes: as many candidates as are bearable. `open`
-  /// has them and leaves stiffening open, `all` has what was run.
-  Run with_all(const Scene&, const RunHooks&, Scene& open, Scene& all, std::vector<std::string>& plan);
+  /// has them and leaves stiffening open, `all` has what was run. The scene gets the tolerance that the integrator
+  /// needs: a run with few modes shows it as well as one with many. Nothing: no more candidates than those of the last
+  /// choice are bearable.
+  std::optional<Run> with_all(Scene&, const RunHooks&, Scene& open, Scene& all, std::vector<std::string>& plan);
   bool has_choice(const Scene&, const std::string& body) const;
   std::vector<Candidate> ranked(const Scene&, const Run&) const;
   void note_still(const std::vector<Candidate>&);
@@ -59,10 +65,12 @@ class Planner {
   std::vector<size_t> open_;                // bodies of the scene
   std::map<std::string, BodyScene> shown_;  // with these modes
   int candidates_ = 12;                     // per body
+  int chosen_from_ = 0;                     // candidates of the last choice
   int steps_ = 0;                           // improvements so far
   size_t kept_ = 0;                         // modes of all bodies, of the last choice
   size_t too_few_ = 0;                      // at least so many are needed, as a budget has shown
   StillKinds still_;
+  bool is_timed_ = false;        // the scene has the tolerance that its integrator needs
   bool costly_ = false;          // more candidates are not bearable
   bool hopeless_ = false;        // nearly all are needed, and without the last of them errors are far too large
   double truncation_ = unknown;  // of the last step

@@ -30,7 +30,8 @@ IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, 
                                      long max_steps) {
   IntegratorOptions o;
   o.method = scene.integrator == "auto" ? chosen : scene.integrator;
-  o.tolerance = scene.tolerance;
+  o.tolerance = scene.step_tolerance();
+  o.accuracy = scene.tolerance;
   if (scene.from) o.start = scene.from->time(), o.largest = scene.from->largest();
   o.duration = scene.duration;
   o.output_step = scene.output_step;
@@ -129,7 +130,7 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
                                  j.kind == JointKind::slider ? "m" : "rad", j.mechanism.damping));
   plan.push_back(
       fmt::format("integrator: {} ({}), tolerance {:.1e}; damping of the method itself shows in energy_balance",
-                  run.motion.summary.method, why_method(scene, run.motion.summary), scene.tolerance));
+                  run.motion.summary.method, why_method(scene, run.motion.summary), scene.step_tolerance()));
   plan.emplace_back(scene.formulation == "multipliers" ? "formulation: redundant coordinates, joints by multipliers"
                                                        : "formulation: relative coordinates");
   describe_model(scene, run, plan);

@@ -52,7 +52,8 @@ std::vector<Reference> references(const Scene& scene, const std::string& used, c
 
 std::vector<ReferenceCheck> reference_checks(const RunResult& r, const RunHooks& hooks) {
   Scene scene = r.scene;
-  scene.tolerance = std::max(1e-12, std::min(scene.tolerance / 100, 1e-9));  // its own error of time is none
+  scene.tolerance = std::max(1e-12, std::min(scene.step_tolerance() / 100, 1e-9));  // its own error of time is none
+  scene.integrator_tolerance = 0;
   OutputFloors floors = floors_of(r.scene, r.bodies);
   RunHooks quiet;
   quiet.interrupt = hooks.interrupt, quiet.bodies = hooks.bodies;

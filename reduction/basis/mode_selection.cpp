@@ -73,34 +73,48 @@ std::vector<int> listed_modes(const ReducedBody& body, std::vector<int> list) {
   return list;
 }
 
-ReducedBody selected(const ReducedBody& body, const std::vector<int>& list) {
-  for (const int k : list)
-    require(k >= 0 && k < body.n(), fmt::format("modes: coordinate {} chosen of a body of {}", k, body.n()));
+ReducedBody combined(const ReducedBody& body, const MatrixXd& T, std::vector<Coordinate> coordinates) {
+  require(T.rows() == body.n() && T.cols() == std::ssize(coordinates),
+          fmt::format("modes: {} x {} combinations of {} coordinates, {} names", T.rows(), T.cols(), body.n(),
+                      coordinates.size()));
   require(body.gram.size() > 0, "modes: body \"" + body.name + "\" has no gram to choose coordinates from");
   ReducedBody result = body;
-  std::vector<int> z = {0, 1, 2, 3};
-  result.coordinates.clear();
-  for (const int k : list) {
-    for (int i = 0; i < 3; ++i) z.push_back(4 + 3 * k + i);
-    result.coordinates.push_back(body.coordinates[static_cast<size_t>(k)]);
-  }
-  const auto keep = [&list](std::vector<MatrixXd>& matrices) {
-    for (MatrixXd& A : matrices) A = A(list, list).eval();
+  const auto combine = [&T](std::vector<MatrixXd>& matrices) {
+    for (MatrixXd& A : matrices) A = (T.transpose() * A * T).eval();
   };
-  const auto keep_columns = [&list](Eigen::Matrix3Xd& S) { S = S(Eigen::all, list).eval(); };
-  ReducedBody blank = blank_body(body.name, static_cast<int>(list.size()));
-  set_invariants(blank, body.gram(z, z));
+  const auto combine_columns = [&T](Eigen::Matrix3Xd& S) { S = (S * T).eval(); };
+  MatrixXd Z = MatrixXd::Zero(4 + 3 * T.rows(), 4 + 3 * T.cols());  // of the columns of gram
+  Z.topLeftCorner<4, 4>().setIdentity();
+  for (Index k = 0; k < T.rows(); ++k)
+    for (Index l = 0; l < T.cols(); ++l) Z.block<3, 3>(4 + 3 * k, 4 + 3 * l).diagonal().setConstant(T(k, l));
+  ReducedBody blank = blank_body(body.name, static_cast<int>(T.cols()));
+  set_invariants(blank, Z.transpose() * body.gram * Z);
   result.Ct = blank.Ct, result.Cr0 = blank.Cr0, result.Me = blank.Me, result.gram = blank.gram;
   result.Cr1 = std::move(blank.Cr1), result.J1 = std::move(blank.J1), result.J2 = std::move(blank.J2);
-  result.Ke = body.Ke(list, list);
-  result.De = body.De(list, list);
-  for (auto* loads : {&result.Kg.spin, &result.Kg.acceleration, &result.Kg.angular_acceleration}) keep(*loads);
-  for (MarkerStiffness& at : result.Kg.markers) keep(at.force), keep(at.torque);
-  for (Marker& at : result.markers) keep_columns(at.S), keep_columns(at.S_theta);
-  std::ranges::for_each(result.display.S, keep_columns);
-  std::ranges::for_each(result.display.S_theta, keep_columns);
-  for (Interface& at : result.interfaces) renumber(at, list);
+  result.Ke = T.transpose() * body.Ke * T;
+  result.De = T.transpose() * body.De * T;
+  for (auto* loads : {&result.Kg.spin, &result.Kg.acceleration, &result.Kg.angular_acceleration}) combine(*loads);
+  for (MarkerStiffness& at : result.Kg.markers) combine(at.force), combine(at.torque);
+  for (Marker& at : result.markers) combine_columns(at.S), combine_columns(at.S_theta);
+  std::ranges::for_each(result.display.S, combine_columns);
+  std::ranges::for_each(result.display.S_theta, combine_columns);
+  result.coordinates = std::move(coordinates);
+  result.interfaces.clear();
   result.certificate.clear();
+  return result;
+}
+
+ReducedBody selected(const ReducedBody& body, const std::vector<int>& list) {
+  MatrixXd T = MatrixXd::Zero(body.n(), std::ssize(list));
+  std::vector<Coordinate> coordinates;
+  for (const int k : list) {
+    require(k >= 0 && k < body.n(), fmt::format("modes: coordinate {} chosen of a body of {}", k, body.n()));
+    T(k, std::ssize(coordinates)) = 1;
+    coordinates.push_back(body.coordinates[static_cast<size_t>(k)]);
+  }
+  ReducedBody result = combined(body, T, std::move(coordinates));
+  result.interfaces = body.interfaces;
+  for (Interface& at : result.interfaces) renumber(at, list);
   return result;
 }
 

@@ -18,6 +18,11 @@ std::vector<int> modes_in_band(const ReducedBody&, double low_hz, double high_hz
 /// The list, sorted. @throws InputError for an index that does not exist or is given twice.
 std::vector<int> listed_modes(const ReducedBody&, std::vector<int>);
 
+/// The body in other coordinates: column k of T, n x m, is what the new one moves of the old ones. All its integrals,
+/// markers and stiffnesses come with them; `coordinates`, m of them, say what the new ones are. It has no interfaces
+/// and no certificate. @throws InputError for other sizes, and when the body has no `gram`.
+ReducedBody combined(const ReducedBody&, const Eigen::MatrixXd& T, std::vector<Coordinate> coordinates);
+
 /// The body with the listed coordinates alone, in that order; all its integrals, markers and stiffnesses come with
 /// them. An interface that loses a coordinate has none any more. The certificate is dropped.
 /// @throws InputError for an index that does not exist, and when the body has no `gram`.

@@ -96,6 +96,7 @@ void expect_same_settings(const Scene& a, const Scene& b) {
   EXPECT_EQ(a.outputs, b.outputs);
   EXPECT_EQ(a.error_budget, b.error_budget);
   EXPECT_EQ(a.integrator, b.integrator);
+  EXPECT_EQ(a.integrator_tolerance, b.integrator_tolerance);
   EXPECT_EQ(a.formulation, b.formulation);
   EXPECT_EQ(a.settle, b.settle);
   EXPECT_EQ(a.rescale_at_events, b.rescale_at_events);
@@ -130,6 +131,7 @@ TEST(Scene, EveryKeyIsRead) {
   const Scene scene = parse_scene(full_scene, "full.toml");
   const BodyScene& body = scene.bodies.at(0);
   EXPECT_EQ(scene.integrator, "adams");
+  EXPECT_EQ(scene.integrator_tolerance, 1e-4);
   EXPECT_EQ(scene.settle, 1e-7);
   EXPECT_FALSE(scene.error_budget);
   EXPECT_TRUE(body.modes_auto);

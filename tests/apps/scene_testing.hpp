@@ -18,7 +18,7 @@ duration = 3
 output_step = 0.1
 vtu_step = 0.5
 accuracy = { tolerance = 1e-3, outputs = ["hub.rate", "box.angle"], budget = false }
-integrator = { method = "adams", formulation = "relative", settle = 1e-7, rescale_at_events = true }
+integrator = { method = "adams", tolerance = 1e-4, formulation = "relative", settle = 1e-7, rescale_at_events = true }
 orbit = { altitude = 5e5, inclination = 1.5, gravity = "differential", J2 = true }
 hub = { mass = 8.5, inertia = [0.1, 0.12, 0.05], fixed = false, size = [0.1, 0.2, 0.3] }
 initial = { rate = [0.1, -0.2, 0.3], velocity = [1, 2, 3e-3] }

@@ -1,0 +1,45 @@
+#include "apps/model/static_shapes.hpp"
+
+#include <algorithm>
+
+namespace flexboom {
+
+std::vector<std::string> static_shapes_beside(const ReducedBody& body, const std::string& clamped) {
+  const auto has = [&](const char* kind) {
+    return std::ranges::find(body.coordinates, kind, &Coordinate::kind) != body.coordinates.end();
+  };
+  const std::string end = clamped == "tip" ? "root" : "tip";
+  std::vector<std::string> shapes;
+  if (!has("axial")) shapes.push_back(end + ".Fx");
+  if (!has("torsion")) shapes.push_back(end + ".Mx");
+  return shapes;
+}
+
+std::vector<std::string> static_shapes_at(const std::string& node_set) {
+  std::vector<std::string> shapes;
+  for (const char* direction : {"Fx", "Fy", "Fz", "Mx", "My", "Mz"}) shapes.push_back(node_set + "." + direction);
+  return shapes;
+}
+
+std::vector<std::string> static_shapes_of_loads(const Scene& scene, const BodyScene& body) {
+  std::vector<std::string> sets, shapes;
+  const auto note = [&](const PlaceScene& place) {
+    if (place.body != body.name || place.marker.empty() || place.marker == body.clamp) return;
+    if (std::ranges::find(sets, place.marker) == sets.end()) sets.push_back(place.marker);
+  };
+  for (const JointScene& joint : scene.joints) note(joint.a), note(joint.b);
+  for (const SpringScene& spring : scene.springs) note(spring.a), note(spring.b);
+  for (const LoadScene& load : scene.loads) note(load.at);
+  for (const std::string& set : sets)
+    for (std::string& shape : static_shapes_at(set)) shapes.push_back(std::move(shape));
+  return shapes;
+}
+
+BodyScene with_static_shapes(BodyScene body, const std::vector<std::string>& shapes) {
+  std::vector<std::string>& all = body.basis.corrections;
+  for (const std::string& shape : shapes)
+    if (std::ranges::find(all, shape) == all.end()) all.push_back(shape);
+  return body;
+}
+
+}  // namespace flexboom

@@ -1,0 +1,26 @@
+#pragma once
+
+#include "apps/scene/scene.hpp"
+#include "reduction/body/reduced_body.hpp"
+
+#include <string>
+#include <vector>
+
+namespace flexboom {
+
+/// Corrections of a basis that stretch and twist a boom at its free end, where `body` has no mode that does: those of a
+/// slender boom are beyond many that bend. `clamped`: the node set that is held.
+std::vector<std::string> static_shapes_beside(const ReducedBody& body, const std::string& clamped);
+
+/// Corrections of all six loads at a node set.
+std::vector<std::string> static_shapes_at(const std::string& node_set);
+
+/// Those of every node set of a boom where joints, springs and loads of the scene act, but the one that is held. The
+/// slope that a torque gives a boom there converges as 1 / n with the number of its clamped modes; with its static
+/// shape as 1 / n^5.
+std::vector<std::string> static_shapes_of_loads(const Scene&, const BodyScene&);
+
+/// A body with these corrections, too.
+BodyScene with_static_shapes(BodyScene, const std::vector<std::string>&);
+
+}  // namespace flexboom
