@@ -110,6 +110,7 @@ void take_plan(Scene& scene, const std::filesystem::path& from) {
             fmt::format("--plan: {} has no boom \"{}\"", from.string(), b.name));
     b.structure = p->structure, b.stiffening = p->stiffening, b.solid = p->solid, b.geometry.order = p->geometry.order;
     b.modes = p->modes, b.shapes = p->shapes, b.directions = p->directions;
+    b.basis.corrections = p->basis.corrections;
     b.modes_auto = p->modes_auto, b.directions_given = p->directions_given;
   }
 }
@@ -123,7 +124,8 @@ bool never_flew(const std::filesystem::path& folder) {
   return document["status"] == "running" || document["status"] == "failed";
 }
 
-/// The scene begins with a saved state, whose numbers of modes replace those of the scene unless they are asked for.
+/// The scene begins with a saved state, whose modes and static shapes replace those of the scene unless they are asked
+/// for.
 void go_on(Scene& scene, const RunArguments& a) {
   const std::filesystem::path& from = a.from;
   if (never_flew(from))
@@ -141,6 +143,8 @@ void go_on(Scene& scene, const RunArguments& a) {
     if (planned) b.open_directions();
     const auto shapes = saved->shapes().find(b.name);
     b.shapes = shapes == saved->shapes().end() ? std::vector<int>() : shapes->second;
+    if (const auto statics = saved->corrections().find(b.name); statics != saved->corrections().end())
+      b.basis.corrections = statics->second;
   }
   scene.from = std::move(saved);
 }

@@ -195,10 +195,10 @@ PreparedBody with_all_shapes(const BodyScene& b, int refine, const std::filesyst
 VectorXd response(const ReducedBody& body, const Coordinate& load) {
   constexpr std::string_view axes = "xyz";
   const auto at = std::ranges::find(body.markers, load.interface, &Marker::name);
-  if (at == body.markers.end() || load.direction.size() != 2 || body.Ke.diagonal().minCoeff() <= 0) return {};
+  if (at == body.markers.end() || load.direction.size() != 2) return {};
   const auto axis = static_cast<Eigen::Index>(axes.find(load.direction[1]));
   const Eigen::Matrix3Xd& S = load.direction[0] == 'F' ? at->S : at->S_theta;
-  return (S.row(axis).transpose().array() / body.Ke.diagonal().array()).matrix();
+  return body.Ke.ldlt().solve(S.row(axis).transpose());
 }
 
 /// Some of the modes, and of each static shape what these modes leave of its deflection: the whole body has the rest of

@@ -29,7 +29,7 @@ using toml_writer::toml;
 
 namespace {
 
-constexpr std::string_view state_format = "flexboom-state-6";
+constexpr std::string_view state_format = "flexboom-state-7";
 constexpr std::string_view checksum_key = "sha256";
 
 /// The line that holds the checksum of all others, or an empty one behind the end.
@@ -121,6 +121,8 @@ std::string to_toml(const FlightState& state, const std::string& scene) {
   for (const auto& [body, n] : state.modes) out.key(toml(body), n);
   if (!state.shapes.empty()) out.table("[shapes]");
   for (const auto& [body, list] : state.shapes) out.key(toml(body), list);
+  if (!state.corrections.empty()) out.table("[corrections]");
+  for (const auto& [body, list] : state.corrections) out.key(toml(body), list);
   out.table("[largest]");
   out.key("energy", state.largest.energy, "[J], of the whole run: what its balances are relative to");
   out.key("shaking", state.largest.shaking, "[J], without the spin of wheels: what errors are weighed against");
@@ -158,6 +160,7 @@ struct SavedState::Content {
   int events = 0;
   std::map<std::string, int> modes;
   std::map<std::string, std::vector<int>> shapes;
+  std::map<std::string, std::vector<std::string>> corrections;
   std::map<std::string, StopHistory> stops;
   MotionScales largest;
   std::map<std::string, double> loops;
@@ -258,6 +261,9 @@ SavedState SavedState::read(const fs::path& path, bool changed_too) {
         if (!(k >= 1 && k <= content->modes[body] && k == std::floor(k)))
           shapes->fault(body, "must be numbers of modes");
       }
+  if (std::optional<TableReader> corrections = table.table("corrections"))
+    for (const auto& [body, value] : corrections->value().entries)
+      content->corrections[body] = corrections->texts(body, {});
   table.table("state", true);
   if (std::optional<TableReader> largest = table.table("largest", true)) {
     MotionScales& l = content->largest;
@@ -299,6 +305,7 @@ const fs::path& SavedState::file() const { return content_->file; }
 double SavedState::time() const { return content_->time; }
 const std::map<std::string, int>& SavedState::modes() const { return content_->modes; }
 const std::map<std::string, std::vector<int>>& SavedState::shapes() const { return content_->shapes; }
+const std::map<std::string, std::vector<std::string>>& SavedState::corrections() const { return content_->corrections; }
 int SavedState::events() const { return content_->events; }
 
 const MotionScales& SavedState::largest() const { return content_->largest; }

@@ -22,9 +22,10 @@ struct FlightState {
   Eigen::VectorXd y;                               // by names
   std::map<std::string, int> modes;                // by body
   std::map<std::string, std::vector<int>> shapes;  // by body, of those that some of the modes stand for (BodyScene)
-  std::map<std::string, StopHistory> stops;        // by hinge or joint
-  MotionScales largest;                            // by which balances are judged
-  std::map<std::string, double> loops;             // angles of hinges that close loops [rad]: which turn they are in
+  std::map<std::string, std::vector<std::string>> corrections;  // by body, of those that have static shapes
+  std::map<std::string, StopHistory> stops;                     // by hinge or joint
+  MotionScales largest;                                         // by which balances are judged
+  std::map<std::string, double> loops;  // angles of hinges that close loops [rad]: which turn they are in
 };
 
 /// Names of the states of a tree, in the order of its layout.
@@ -47,6 +48,7 @@ class SavedState {
   int events() const;
   const std::map<std::string, int>& modes() const;
   const std::map<std::string, std::vector<int>>& shapes() const;
+  const std::map<std::string, std::vector<std::string>>& corrections() const;
   const MotionScales& largest() const;
 
   /// The numbers of these names. @throws InputError naming each that is missing, not finite or too many.

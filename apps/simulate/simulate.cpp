@@ -53,6 +53,8 @@ FlightState end_of(const std::vector<PreparedBody>& bodies, double time, const V
   for (const PreparedBody& p : bodies) {
     end.modes[p.body.name] = p.modes;
     if (!p.shapes.empty()) end.shapes[p.body.name] = p.shapes;
+    for (const Coordinate& c : p.body.coordinates)
+      if (c.kind == "attachment") end.corrections[p.body.name].push_back(c.interface + "." + c.direction);
   }
   return end;
 }

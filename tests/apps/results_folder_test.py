@@ -394,7 +394,7 @@ class Changed(Case):
             result = flexboom("run", "sport", "--duration", "0.3", "--continue", out, "--out", self.folder / "later",
                               "--force")
             self.assert_exit(INPUT, result)
-            self.assertIn(f'is "flexboom-state-{version}"; this version reads "flexboom-state-6"', result.stderr)
+            self.assertIn(f'is "flexboom-state-{version}"; this version reads "flexboom-state-7"', result.stderr)
 
 
 class SlowKilled(Kills):

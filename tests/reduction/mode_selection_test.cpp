@@ -63,6 +63,35 @@ TEST(ModeSelection, ABodyOfChosenCoordinatesIsThatOfTheChosenShapes) {
   EXPECT_THROW(selected(all, {6}), InputError);
 }
 
+/// What is linear in the shapes goes with T, what is quadratic with T twice; a combination of combinations is one.
+TEST(ModeSelection, ABodyOfCombinationsHasTheIntegralsOfItsShapes) {
+  const test::Boom boom = test::make_boom(test::boom4(BeamTheory::timoshenko, true));
+  const Clamp clamp(node_set(boom.mesh, "root"));
+  const ModalBasis basis = clamped_modes(boom.mesh, boom.assembly, clamp, {.num_modes = 6, .sigma = {}});
+  ReducedBody all = reduce(boom.mesh, boom.assembly, basis, "boom");
+  all.Kg = geometric_stiffness(boom.mesh, boom.assembly, clamp, basis.Phi, {.markers = {"tip"}});
+  const MatrixXd T = (MatrixXd(6, 2) << 0.3, -1, 0.7, 0.1, -0.4, 0.2, 0, 0.9, 1.1, -0.6, 0.2, 0.5).finished();
+  const ReducedBody body = combined(all, T, {{"a"}, {"b"}});
+  body.validate();
+  const auto near = [mass = all.m](const MatrixXd& A, const MatrixXd& B) {
+    EXPECT_LE((A - B).norm(), 1e-12 * (B.norm() + mass));
+  };
+  near(body.Ct, all.Ct * T), near(body.Cr0, all.Cr0 * T), near(body.Me, T.transpose() * all.Me * T);
+  near(body.Ke, T.transpose() * all.Ke * T), near(body.Kg.spin[2], T.transpose() * all.Kg.spin[2] * T);
+  near(marker(body, "tip").S, marker(all, "tip").S * T);
+  Eigen::Matrix3d first = Eigen::Matrix3d::Zero(), second = first;
+  Eigen::Matrix3Xd coupling = Eigen::Matrix3Xd::Zero(3, 6);
+  for (size_t k = 0; k < 6; ++k) {
+    const auto row = static_cast<Index>(k);
+    first += T(row, 1) * all.J1[k];
+    coupling += T(row, 1) * all.Cr1[k];
+    for (size_t l = 0; l < 6; ++l) second += T(row, 0) * T(static_cast<Index>(l), 1) * all.J2[k][l];
+  }
+  near(body.J1[1], first), near(body.J2[0][1], second), near(body.Cr1[1], coupling * T);
+  EXPECT_THROW(combined(all, T, {{"a"}}), InputError);
+  EXPECT_THROW(combined(all, T.topRows(5), {{"a"}, {"b"}}), InputError);
+}
+
 TEST(ModeSelection, ByEffectiveMassTakesTheFewest) {
   // The table's columns "cum": translation 0.613, 0.801, 0.866, 0.899, 0.919; inertia 0.971, 0.9954.
   const ReducedBody body = line_boom(20);
