@@ -28,9 +28,7 @@ std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions 
   o.select.reset();
   const int given = o.basis.modes;
   if (o.basis.name == "clamped" && !o.basis.in_plane && model.body && !model.clamped.empty())
-    for (const std::string& shape : static_shapes_at(model.clamped == "tip" ? "root" : "tip"))
-      if (std::ranges::find(o.basis.corrections, shape) == o.basis.corrections.end())
-        o.basis.corrections.push_back(shape);
+    add_static_shapes(o.basis.corrections, static_shapes_at(model.clamped == "tip" ? "root" : "tip"));
   for (int more = 8; more >= 0; more -= 2) {
     o.basis.modes = given + (o.basis.in_plane ? more / 2 : more);
     try {

@@ -1,5 +1,7 @@
 #include "apps/model/static_shapes.hpp"
 
+#include "fem/base/text_reader.hpp"
+
 #include <algorithm>
 
 namespace flexboom {
@@ -35,10 +37,14 @@ std::vector<std::string> static_shapes_of_loads(const Scene& scene, const BodySc
   return shapes;
 }
 
-BodyScene with_static_shapes(BodyScene body, const std::vector<std::string>& shapes) {
-  std::vector<std::string>& all = body.basis.corrections;
+void add_static_shapes(std::vector<std::string>& corrections, const std::vector<std::string>& shapes) {
   for (const std::string& shape : shapes)
-    if (std::ranges::find(all, shape) == all.end()) all.push_back(shape);
+    if (std::ranges::none_of(corrections, [&](const std::string& c) { return same_but_case(c, shape); }))
+      corrections.push_back(shape);
+}
+
+BodyScene with_static_shapes(BodyScene body, const std::vector<std::string>& shapes) {
+  add_static_shapes(body.basis.corrections, shapes);
   return body;
 }
 

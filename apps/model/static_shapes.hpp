@@ -20,6 +20,9 @@ std::vector<std::string> static_shapes_at(const std::string& node_set);
 /// shape as 1 / n^5.
 std::vector<std::string> static_shapes_of_loads(const Scene&, const BodyScene&);
 
+/// Adds those that are not there; names of node sets compare without case.
+void add_static_shapes(std::vector<std::string>& corrections, const std::vector<std::string>& shapes);
+
 /// A body with these corrections, too.
 BodyScene with_static_shapes(BodyScene, const std::vector<std::string>&);
 

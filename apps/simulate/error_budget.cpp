@@ -391,7 +391,7 @@ std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const Ou
                                                 const RunHooks& hooks, std::vector<std::string>& plan) {
   for (;; --digits) {
     const Scene tight = with_a_digit_more(flown);
-    Run finer = run_once(tight, hooks);
+    Run finer = run_once(tight, hooks, 0, bearable_steps(run));
     std::vector<OutputDifference> differences = compare_outputs(run.outputs, finer.outputs, flown.outputs, floors);
     const double error = largest(differences);
     const bool is_stopped = hooks.interrupt != nullptr && hooks.interrupt->load();

@@ -157,7 +157,11 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
   Run few = run_once(with_few, hooks);
   if (!std::exchange(is_timed_, true)) {
     constexpr int digits = 6;
-    settle_time_error(with_few, few, floors_of(scene, few.bodies), digits, hooks, plan);
+    try {
+      settle_time_error(with_few, few, floors_of(scene, few.bodies), digits, hooks, plan);
+    } catch (const NumericalError& e) {  // no more digits can be had: those that were reached count
+      plan.push_back(fmt::format("time integration: no tighter than {:.0e}: {}", with_few.step_tolerance(), e.what()));
+    }
     scene.integrator_tolerance = with_few.integrator_tolerance;
   }
   const auto run = [&](int candidates, long max_steps) {
@@ -296,8 +300,9 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
     return false;
   const auto known = [](double part) { return std::isnan(part) ? 0 : part; };
   const double truncation = known(worst->truncation), discretisation = known(worst->discretisation);
-  // A repeat has an error of time of its own: what is no more than that and the run's together is no truncation.
-  const double others = std::max(2 * known(worst->time), known(worst->linearisation));
+  // A repeat has an error of time of its own. Where those are large, what is no more than both is no truncation.
+  const double time = known(worst->time), of_both = time > scene.tolerance / 3 ? 2 * time : time;
+  const double others = std::max(of_both, known(worst->linearisation));
   if (worst->known() <= scene.tolerance || std::max(truncation, discretisation) <= others) return false;
   if (truncation >= discretisation) {
     const double before = std::exchange(truncation_, worst->truncation);
