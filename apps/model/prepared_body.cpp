@@ -13,6 +13,7 @@
 #include "reduction/invariants/eq14.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
@@ -191,14 +192,14 @@ PreparedBody with_all_shapes(const BodyScene& b, int refine, const std::filesyst
   return r;
 }
 
-/// The response of a body to a unit of the load that a static shape is of, n; empty where nobody knows the load.
-VectorXd response(const ReducedBody& body, const Coordinate& load) {
+/// What a unit of the load that a static shape is of does on every coordinate, n; empty where nobody knows the load.
+VectorXd unit_load(const ReducedBody& body, const Coordinate& load) {
   constexpr std::string_view axes = "xyz";
   const auto at = std::ranges::find(body.markers, load.interface, &Marker::name);
   if (at == body.markers.end() || load.direction.size() != 2) return {};
   const auto axis = static_cast<Eigen::Index>(axes.find(load.direction[1]));
   const Eigen::Matrix3Xd& S = load.direction[0] == 'F' ? at->S : at->S_theta;
-  return body.Ke.ldlt().solve(S.row(axis).transpose());
+  return S.row(axis).transpose();
 }
 
 /// Some of the modes, and of each static shape what these modes leave of its deflection: the whole body has the rest of
@@ -206,13 +207,14 @@ VectorXd response(const ReducedBody& body, const Coordinate& load) {
 ReducedBody with_chosen_modes(const ReducedBody& whole, const std::vector<int>& chosen, int modes) {
   const int statics = whole.n() - modes;
   MatrixXd rest(whole.n(), statics);
+  const Eigen::LDLT<MatrixXd> stiffness(whole.Ke);
   for (int k = 0; k < statics; ++k) {
-    const VectorXd r = response(whole, whole.coordinates[static_cast<size_t>(modes + k)]);
-    if (r.size() == 0) {
+    const VectorXd load = unit_load(whole, whole.coordinates[static_cast<size_t>(modes + k)]);
+    if (load.size() == 0) {
       rest.col(k) = VectorXd::Unit(whole.n(), modes + k);
       continue;
     }
-    rest.col(k) = r;
+    rest.col(k) = stiffness.solve(load);
     rest(chosen, k).setZero();
     rest.col(k) /= std::sqrt(rest.col(k).dot(whole.Me * rest.col(k)));
   }

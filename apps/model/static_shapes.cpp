@@ -44,7 +44,7 @@ void add_static_shapes(std::vector<std::string>& corrections, const std::vector<
 }
 
 BodyScene with_static_shapes(BodyScene body, const std::vector<std::string>& shapes) {
-  add_static_shapes(body.basis.corrections, shapes);
+  if (body.structure == "beam" || body.structure == "solid") add_static_shapes(body.basis.corrections, shapes);
   return body;
 }
 

@@ -23,7 +23,7 @@ std::vector<std::string> static_shapes_of_loads(const Scene&, const BodyScene&);
 /// Adds those that are not there; names of node sets compare without case.
 void add_static_shapes(std::vector<std::string>& corrections, const std::vector<std::string>& shapes);
 
-/// A body with these corrections, too.
+/// A body with these corrections, too, where it is of elements.
 BodyScene with_static_shapes(BodyScene, const std::vector<std::string>&);
 
 }  // namespace flexboom

@@ -18,8 +18,8 @@ class Planner {
 
   /// Candidates that no motion reaches are left out; of the others, the fewest that move most and are enough. Where the
   /// scene has no budget and all are needed, there are twice as many; where that ends, the scene gets a warning.
-  /// Afterwards no body of the scene is left open. `plan` gets one line per body. False:
-  /// there was nothing to choose, or more candidates than the last time are not bearable.
+  /// Afterwards no body of the scene is left open. `plan` gets one line per body. False: there
+  /// was nothing to choose, or more candidates than the last time are not bearable.
   /// @throws InputError, NumericalError as run_once, of the candidates.
   bool choose(Scene&, const RunHooks&, std::vector<std::string>& plan);
 

@@ -63,7 +63,7 @@ TEST(ModeSelection, ABodyOfChosenCoordinatesIsThatOfTheChosenShapes) {
   EXPECT_THROW(selected(all, {6}), InputError);
 }
 
-/// What is linear in the shapes goes with T, what is quadratic with T twice; a combination of combinations is one.
+/// What is linear in the shapes goes with T, what is quadratic with T twice.
 TEST(ModeSelection, ABodyOfCombinationsHasTheIntegralsOfItsShapes) {
   const test::Boom boom = test::make_boom(test::boom4(BeamTheory::timoshenko, true));
   const Clamp clamp(node_set(boom.mesh, "root"));
