@@ -43,9 +43,10 @@ void add_static_shapes(std::vector<std::string>& corrections, const std::vector<
       corrections.push_back(shape);
 }
 
-BodyScene with_static_shapes(BodyScene body, const std::vector<std::string>& shapes) {
-  if (body.structure == "beam" || body.structure == "solid") add_static_shapes(body.basis.corrections, shapes);
-  return body;
+BodyScene with_static_shapes(const BodyScene& body, const std::vector<std::string>& shapes) {
+  BodyScene more = body;
+  if (body.structure == "beam" || body.structure == "solid") add_static_shapes(more.basis.corrections, shapes);
+  return more;
 }
 
 }  // namespace flexboom

@@ -24,6 +24,6 @@ std::vector<std::string> static_shapes_of_loads(const Scene&, const BodyScene&);
 void add_static_shapes(std::vector<std::string>& corrections, const std::vector<std::string>& shapes);
 
 /// A body with these corrections, too, where it is of elements.
-BodyScene with_static_shapes(BodyScene, const std::vector<std::string>&);
+BodyScene with_static_shapes(const BodyScene&, const std::vector<std::string>&);
 
 }  // namespace flexboom

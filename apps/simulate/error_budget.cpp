@@ -65,7 +65,7 @@ BodyScene with_modes_beyond(BodyScene b, int highest, int resolved, const ModesB
     const std::vector<std::string> statics = static_shapes_beside(all.body, b.clamp);
     const bool has_more = b.modes == wanted && wanted < std::min(highest + most, resolved);
     if (has_more && (!enough || (b.structure == "beam" && !statics.empty()))) continue;
-    return with_static_shapes(std::move(b), statics);
+    return with_static_shapes(b, statics);
   }
 }
 
@@ -121,7 +121,7 @@ Scene with_more_modes(Scene scene, const ModesBeyond& more, const RunHooks& hook
     if (b.structure == "rigid" || !b.is_boom()) continue;
     if (b.basis.name == "clamped") {
       b = with_more_of_each_kind(b, more, scene.bodies_kept_in, hooks);
-      b = with_static_shapes(std::move(b), static_shapes_of_loads(scene, b));
+      b = with_static_shapes(b, static_shapes_of_loads(scene, b));
       continue;
     }
     const int per_plane = b.directions == "all" ? (b.modes + 1) / 2 : b.modes;
