@@ -1,6 +1,7 @@
 #include "fem/mesh/beam.hpp"
 
 #include "fem/base/check.hpp"
+#include "fem/mesh/shape_pairs.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Geometry>
@@ -208,15 +209,6 @@ Slopes slopes_at(const Frame& frame, int p, bool with_shear, double xi, const Ei
   return {rows.motion.bottomRows<3>() * q, rows.strain * q};
 }
 
-// Adds the second variation of factor * a b, for all pairs of columns.
-template <class A, class B>
-void add_pairs(Eigen::Ref<VectorXd> pairs, double factor, const A& a, const B& b) {
-  const Index count = a.size();
-  for (Index k = 0, first = 0; k < count; first += count - k, ++k) {
-    pairs.segment(first, count - k) += factor * (a(k) * b.tail(count - k) + b(k) * a.tail(count - k)).transpose();
-  }
-}
-
 // Second-order strains that the resultants N, Qy, Qz, T, My, Mz work on: columns, pairs x 6. U = N (v'^2 + w'^2 +
 // Ip/A theta_x'^2) / 2 + Qy (w' theta_x + theta_x theta_y / 2) + Qz (-v' theta_x + theta_x theta_z / 2)
 // - M . (theta x theta') / 2.
@@ -224,7 +216,7 @@ MatrixXd second_order(const Slopes& s, double polar) {
   const auto x = s.theta.row(0), y = s.theta.row(1), z = s.theta.row(2);
   const auto dx = s.strain.row(3), dy = s.strain.row(4), dz = s.strain.row(5);
   const VectorXd dv = (s.strain.row(1) + z).transpose(), dw = (s.strain.row(2) - y).transpose();
-  MatrixXd pairs = MatrixXd::Zero(x.size() * (x.size() + 1) / 2, 6);
+  MatrixXd pairs = MatrixXd::Zero(number_of_pairs(x.size()), 6);
   add_pairs(pairs.col(0), 0.5, dv.transpose(), dv.transpose());
   add_pairs(pairs.col(0), 0.5, dw.transpose(), dw.transpose());
   add_pairs(pairs.col(0), 0.5 * polar, dx, dx);

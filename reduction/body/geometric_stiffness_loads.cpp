@@ -1,14 +1,16 @@
 #include "reduction/body/geometric_stiffness_loads.hpp"
 
 #include "fem/base/check.hpp"
+#include "fem/mesh/shape_pairs.hpp"
 #include "reduction/body/tilde.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Dense>
 
+#include <cmath>
 #include <functional>
 #include <numeric>
-#include <span>
+#include <vector>
 
 namespace flexboom {
 namespace {
@@ -36,35 +38,50 @@ MatrixXd nodal_fields(const Mesh& mesh, const DofMap& dofs, const LinearFields& 
   return B;
 }
 
-/// Visits the mass points of beams and of bodies on nodes with their arm from the axis or node, and theta = rotation *
-/// (values of the freedoms).
+/// What turns as one, a section of a beam or a body on a node: theta = rotation * (values of the freedoms).
+struct TurningPart {
+  Matrix3Xd rotation;
+  std::vector<int> dofs;
+  int number = 0;  // differs from one to the next
+};
+
+/// Visits the mass points of beams and of bodies on nodes with their arm from the axis or node.
 using ArmVisitor = std::function<void(double dm, const Vector3d& u0, const Eigen::Ref<const Matrix3Xd>& N,
-                                      const Vector3d& arm, const Matrix3Xd& rotation, std::span<const int> dofs)>;
+                                      const Vector3d& arm, const TurningPart&)>;
 
 void for_each_beam_point(const Mesh& mesh, const DofMap& dofs, const ArmVisitor& visit) {
+  constexpr double same = 1e-12;  // of an element's length: points of one section
+  TurningPart section;
   for (int e = 0; e < std::ssize(mesh.elements); ++e) {
     const Element& element = mesh.elements[static_cast<size_t>(e)];
-    if (type_of(element).shape != Shape::line) continue;
-    const std::vector<int> of_element = dofs.of_element(mesh, e);
+    const ElementType& type = type_of(element);
+    if (type.shape != Shape::line) continue;
+    section.dofs = dofs.of_element(mesh, e);
     const Vector3d start = mesh.nodes.col(element.nodes[0]), axis = mesh.nodes.col(element.nodes[1]) - start;
-    type_of(element).mass_points(
-        mesh, element, 0, [&](double dm, const Vector3d& u0, const Eigen::Ref<const Matrix3Xd>& N) {
-          const double s = axis.dot(u0 - start) / axis.squaredNorm();
-          const Matrix3Xd rotation = type_of(element).interpolation(mesh, element, {s, 0, 0}).bottomRows<3>();
-          visit(dm, u0, N, u0 - start - s * axis, rotation, of_element);
-        });
+    double s = -1;
+    type.mass_points(mesh, element, 0, [&](double dm, const Vector3d& u0, const Eigen::Ref<const Matrix3Xd>& N) {
+      const double here = axis.dot(u0 - start) / axis.squaredNorm();
+      if (std::abs(here - s) > same) {
+        s = here;
+        section.rotation = type.interpolation(mesh, element, {s, 0, 0}).bottomRows<3>();
+        ++section.number;
+      }
+      visit(dm, u0, N, u0 - start - s * axis, section);
+    });
   }
 }
 
 void for_each_body_point(const Mesh& mesh, const DofMap& dofs, const ArmVisitor& visit) {
+  TurningPart part;
   for (const NodalBody& body : mesh.bodies) {
     const int freedoms = dofs.freedoms_of(body.node);
-    std::vector<int> of_node(static_cast<size_t>(freedoms));
-    std::iota(of_node.begin(), of_node.end(), dofs.of_node(body.node, 0));
-    Matrix3Xd rotation = Matrix3Xd::Zero(3, freedoms);
-    if (freedoms == 6) rotation.rightCols<3>().setIdentity();
+    part.dofs.resize(static_cast<size_t>(freedoms));
+    std::iota(part.dofs.begin(), part.dofs.end(), dofs.of_node(body.node, 0));
+    part.rotation = Matrix3Xd::Zero(3, freedoms);
+    if (freedoms == 6) part.rotation.rightCols<3>().setIdentity();
+    --part.number;
     nodal_body_mass_points(mesh, body, [&](double dm, const Vector3d& u0, const Eigen::Ref<const Matrix3Xd>& N) {
-      visit(dm, u0, N.leftCols(freedoms), u0 - mesh.nodes.col(body.node), rotation, of_node);
+      visit(dm, u0, N.leftCols(freedoms), u0 - mesh.nodes.col(body.node), part);
     });
   }
 }
@@ -81,15 +98,37 @@ MatrixXd values_at(const LinearFields& fields, const Vector3d& u0) {
   return b;
 }
 
-/// Adds theta^T W theta, W = (f . r) I - (f r^T + r f^T) / 2, for the forces f (3 x loads) on an arm r: less their work
-/// on its second-order displacement theta x (theta x r) / 2.
-void add_arm(std::vector<MatrixXd>& Kg, const MatrixXd& forces, const Vector3d& r, const MatrixXd& theta) {
-  for (size_t c = 0; c < Kg.size(); ++c) {
-    const Vector3d f = forces.col(static_cast<Index>(c));
-    const Matrix3d W = f.dot(r) * Matrix3d::Identity() - (f * r.transpose() + r * f.transpose()) / 2;
-    Kg[c] += theta.transpose() * W * theta;
+/// Loads on what turns as one: of each (columns) the entries xx, yy, zz, xy, yz, zx of the symmetric W that has
+/// theta^T W theta as the work on the second-order displacement theta x (theta x r) / 2, taken off.
+class LoadsOnArms {
+ public:
+  explicit LoadsOnArms(Index loads) : W_(6, loads) { W_.setZero(); }
+
+  /// W += (f . r) I - (f r^T + r f^T) / 2, for the forces f (3 x loads) on an arm r.
+  void add(const MatrixXd& f, const Vector3d& r) {
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, k = (i + 2) % 3;
+      W_.row(i) += r(j) * f.row(j) + r(k) * f.row(k);
+      W_.row(3 + i) -= (r(i) * f.row(j) + r(j) * f.row(i)) / 2;
+    }
   }
-}
+
+  /// Adds the work on what turns by theta (3 x shapes), and forgets the loads.
+  void work_on(const MatrixXd& theta, MatrixXd& work) {
+    if (W_.isZero(0)) return;
+    pairs_.setZero(number_of_pairs(theta.cols()), 6);
+    for (int i = 0; i < 3; ++i) {
+      add_pairs(pairs_.col(i), 0.5, theta.row(i), theta.row(i));
+      add_pairs(pairs_.col(3 + i), 1, theta.row(i), theta.row((i + 1) % 3));
+    }
+    work.noalias() += pairs_ * W_;
+    W_.setZero();
+  }
+
+ private:
+  Eigen::Matrix<double, 6, Eigen::Dynamic> W_;
+  MatrixXd pairs_;
+};
 
 }  // namespace
 
@@ -114,8 +153,9 @@ MatrixXd inertial_forces(const Mesh& mesh, const Assembly& assembly) {
   MatrixXd F = symmetric_product(assembly.M, B);
   for_each_arm(mesh, assembly.dofs,
                [&](double dm, const Vector3d& u0, const Eigen::Ref<const Matrix3Xd>& N, const Vector3d&,
-                   const Matrix3Xd&, std::span<const int> dofs) {
-                 F(dofs, Eigen::all) += dm * N.transpose() * (values_at(fields, u0) - N * B(dofs, Eigen::all));
+                   const TurningPart& part) {
+                 F(part.dofs, Eigen::all) +=
+                     dm * N.transpose() * (values_at(fields, u0) - N * B(part.dofs, Eigen::all));
                });
   return F;
 }
@@ -149,31 +189,38 @@ MatrixXd marker_forces(const Mesh& mesh, const DofMap& dofs, const std::string& 
   return forces;
 }
 
-void add_inertia_of_arms(std::vector<MatrixXd>& Kg, const Mesh& mesh, const DofMap& dofs, const LinearFields& fields,
+void add_inertia_of_arms(MatrixXd& work, const Mesh& mesh, const DofMap& dofs, const LinearFields& fields,
                          const MatrixXd& Phi) {
+  LoadsOnArms loads(fields.cols());
+  TurningPart last;
+  const auto work_on_last = [&] {
+    if (last.number != 0) loads.work_on(last.rotation * Phi(last.dofs, Eigen::all), work);
+  };
   for_each_arm(mesh, dofs,
                [&](double dm, const Vector3d& u0, const Eigen::Ref<const Matrix3Xd>&, const Vector3d& arm,
-                   const Matrix3Xd& rotation, std::span<const int> point_dofs) {
-                 if (arm.isZero(0)) return;
-                 add_arm(Kg, dm * values_at(fields, u0), arm, rotation * Phi(point_dofs, Eigen::all));
+                   const TurningPart& part) {
+                 if (part.number != last.number) work_on_last(), last = part;
+                 loads.add(dm * values_at(fields, u0), arm);
                });
+  work_on_last();
 }
 
-void add_rigid_connections(std::vector<MatrixXd>& Kg, const Mesh& mesh, const Assembly& assembly, const MatrixXd& F,
+void add_rigid_connections(MatrixXd& work, const Mesh& mesh, const Assembly& assembly, const MatrixXd& F,
                            const MatrixXd& U0, const MatrixXd& Phi) {
   if (mesh.rigid_connections.empty()) return;
   const DofMap& dofs = assembly.dofs;
   const MatrixXd forces = F - symmetric_product(assembly.K, U0);  // of the nodes on what they are tied to
+  LoadsOnArms loads(F.cols());
   for (const RigidConnection& c : mesh.rigid_connections) {
-    const MatrixXd theta = Phi.middleRows<3>(dofs.of_node(c.reference, 3));
     for (const int node : c.nodes) {
       if (node == c.reference) continue;
       MatrixXd carried = forces.middleRows<3>(dofs.of_node(node, 0));
       for (Index k = 0; k < 3; ++k) {
         if (!c.components[static_cast<size_t>(k)]) carried.row(k).setZero();
       }
-      add_arm(Kg, carried, mesh.nodes.col(node) - mesh.nodes.col(c.reference), theta);
+      loads.add(carried, mesh.nodes.col(node) - mesh.nodes.col(c.reference));
     }
+    loads.work_on(Phi.middleRows<3>(dofs.of_node(c.reference, 3)), work);
   }
 }
 

@@ -31,12 +31,12 @@ Eigen::MatrixXd inertial_forces(const Mesh&, const Assembly&);
 Eigen::MatrixXd marker_forces(const Mesh&, const DofMap&, const std::string& name);
 
 /// Sections of beams and bodies on nodes turn, and S has the linear part of that: theta x r. Adds what their inertial
-/// forces lack, their work on theta x (theta x r) / 2. Kg: one matrix per column of `fields`.
-void add_inertia_of_arms(std::vector<Eigen::MatrixXd>& Kg, const Mesh&, const DofMap&, const LinearFields& fields,
+/// forces lack, their work on theta x (theta x r) / 2. work: pairs of shapes x columns of `fields`.
+void add_inertia_of_arms(Eigen::MatrixXd& work, const Mesh&, const DofMap&, const LinearFields& fields,
                          const Eigen::MatrixXd& Phi);
 
 /// The same of rigid connections, whose arms carry the forces of their nodes (loads F, static displacements U0).
-void add_rigid_connections(std::vector<Eigen::MatrixXd>& Kg, const Mesh&, const Assembly&, const Eigen::MatrixXd& F,
+void add_rigid_connections(Eigen::MatrixXd& work, const Mesh&, const Assembly&, const Eigen::MatrixXd& F,
                            const Eigen::MatrixXd& U0, const Eigen::MatrixXd& Phi);
 
 }  // namespace flexboom

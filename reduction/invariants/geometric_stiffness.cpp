@@ -3,6 +3,7 @@
 #include "fem/base/check.hpp"
 #include "fem/base/parallel.hpp"
 #include "fem/linear_algebra/dense.hpp"
+#include "fem/mesh/shape_pairs.hpp"
 #include "reduction/basis/static_shapes.hpp"
 #include "reduction/body/geometric_stiffness_loads.hpp"
 
@@ -96,7 +97,7 @@ MatrixXd prestress_work(const Mesh& mesh, const DofMap& dofs, const MatrixXd& U0
   std::array<MatrixXd, blocks> parts;
   parallel_for(threads, blocks, 1, [&](int b) {
     MatrixXd& part = parts[static_cast<size_t>(b)];
-    part.setZero(Phi.cols() * (Phi.cols() + 1) / 2, U0.cols());
+    part.setZero(number_of_pairs(Phi.cols()), U0.cols());
     for (int e = elements * b / blocks; e < elements * (b + 1) / blocks; ++e) {
       const Element& element = mesh.elements[static_cast<size_t>(e)];
       const std::vector<int> element_dofs = dofs.of_element(mesh, e);
@@ -106,16 +107,6 @@ MatrixXd prestress_work(const Mesh& mesh, const DofMap& dofs, const MatrixXd& U0
   });
   for (size_t b = 1; b < blocks; ++b) parts[0] += parts[b];
   return parts[0];
-}
-
-/// The symmetric matrix of a packed lower triangle.
-MatrixXd unpacked(const Eigen::Ref<const VectorXd>& pairs, Index n) {
-  MatrixXd A(n, n);
-  for (Index k = 0, first = 0; k < n; first += n - k, ++k) {
-    A.col(k).tail(n - k) = pairs.segment(first, n - k);
-    A.row(k).tail(n - k) = pairs.segment(first, n - k).transpose();
-  }
-  return A;
 }
 
 }  // namespace
@@ -129,11 +120,11 @@ GeometricStiffness geometric_stiffness(const Mesh& mesh, const Assembly& assembl
   std::vector<MatrixXd> loads = {inertial_forces(mesh, assembly)};
   for (const std::string& name : options.markers) loads.push_back(marker_forces(mesh, assembly.dofs, name));
   const Statics state = statics(mesh, assembly, clamp, loads, Phi, options);
-  const MatrixXd work = prestress_work(mesh, assembly.dofs, state.U0, Phi, options.threads);
+  MatrixXd work = prestress_work(mesh, assembly.dofs, state.U0, Phi, options.threads);
+  add_inertia_of_arms(work, mesh, assembly.dofs, state.fields, Phi);
+  add_rigid_connections(work, mesh, assembly, state.F, state.U0, Phi);
   std::vector<MatrixXd> matrices;
   for (Index c = 0; c < work.cols(); ++c) matrices.push_back(unpacked(work.col(c), Phi.cols()));
-  add_inertia_of_arms(matrices, mesh, assembly.dofs, state.fields, Phi);
-  add_rigid_connections(matrices, mesh, assembly, state.F, state.U0, Phi);
 
   auto next = matrices.begin();
   const auto take = [&next](Index count) {

@@ -3,6 +3,7 @@
 #include "fem/base/check.hpp"
 #include "fem/booms/solid_boom.hpp"
 #include "fem/linear_algebra/sparse_factor.hpp"
+#include "fem/mesh/shape_pairs.hpp"
 #include "reduction/basis/modal_basis.hpp"
 #include "reduction/basis/reduced_matrices.hpp"
 #include "reduction/body/geometric_stiffness_loads.hpp"
@@ -68,7 +69,7 @@ class PrestressWork : public ::testing::TestWithParam<Row> {
     return q;
   }
   MatrixXd work(const Mesh& mesh, const MatrixXd& q0, const MatrixXd& q) const {
-    MatrixXd work = MatrixXd::Zero(q.cols() * (q.cols() + 1) / 2, q0.cols());
+    MatrixXd work = MatrixXd::Zero(number_of_pairs(q.cols()), q0.cols());
     type().add_prestress_work(mesh, mesh.elements[0], q0, q, work);
     return work;
   }
