@@ -135,7 +135,7 @@ void set_mechanism(const Joint& joint, Link& link) {
 void set_second_order(const SecondOrderShapes& body, const Vector3d& origin, const Matrix3d& axes, Link& link) {
   const ReducedBody own = seen_from(body.body, origin, axes);
   pack_integrals(own, link.shapes);
-  link.follow = packed_vector_family(body.follow);
+  link.follow = equations::Rows<double>(packed_vector_family(body.follow));
   const auto r = std::ssize(body.follow), n = own.n() - r;
   for (Eigen::Index a = n; a < own.n(); ++a)
     for (Eigen::Index k = 0; k < n; ++k) link.Me_follow.push_back(own.Me(a, k));

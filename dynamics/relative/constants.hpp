@@ -33,7 +33,7 @@ struct Link {
   /// With geometric stiffness: integrals of n + r shapes, the last r of which follow the coordinates: they move by
   /// Q_a = 1/2 q^T H_a q, H_a the terms of component a. Together they move the points by S q + u2(q).
   equations::Body shapes;
-  std::vector<Term> follow;
+  equations::Rows<double> follow;
   std::vector<double> Me_follow;  // r x n, integral of rho S_a . S_k
   bool second_order = false;
 

@@ -87,7 +87,7 @@ void condense_link(const Link& link, const T* y, LinkScratch<T>& s, bool forces)
   } else if (link.second_order) {
     SecondOrderScratch<T>& o = s.second_order;
     const auto n = static_cast<size_t>(link.body.n);
-    o.least_pivot = invert(n, o.Me, o.factor, o.Me_inverse);
+    o.least_pivot = invert(n, o.Me, o.row, o.Me_inverse);
     const InverseOfMe<T> inverse = {o.Me_inverse.data(), n, false};
     for (size_t k = 0; k < n; ++k) {
       o.Gt[k] = Vec3<T>{};

@@ -58,52 +58,43 @@ template <class T>
 void follow_coordinates(const Link& link, const T* q, const T* q_dot, SecondOrderScratch<T>& s) {
   const auto n = static_cast<size_t>(link.body.n), r = link.followers();
   for (T& x : s.slope) x = T(0.0);
-  for (const Term& t : link.follow) {
-    const auto a = static_cast<size_t>(t.component), k = static_cast<size_t>(t.k);
-    s.slope[a * n + k] += t.value * q[t.l];
+  for (T& x : s.Q_ddot) x = T(0.0);
+  for (const equations::RowOf& row : link.follow.rows) {
+    const auto a = static_cast<size_t>(row.component), k = static_cast<size_t>(row.k);
+    s.slope[a * n + k] = link.follow.sum(row, q);
+    s.Q_ddot[a] += link.follow.sum(row, q_dot) * q_dot[k];
   }
   for (size_t k = 0; k < n; ++k) s.Q[k] = q[k], s.Q_dot[k] = q_dot[k];
   for (size_t a = 0; a < r; ++a) {
     T Q(0.0), Q_dot(0.0);
     for (size_t k = 0; k < n; ++k) Q += s.slope[a * n + k] * q[k], Q_dot += s.slope[a * n + k] * q_dot[k];
     s.Q[n + a] = 0.5 * Q, s.Q_dot[n + a] = Q_dot;
-    s.Q_ddot[a] = T(0.0);
   }
-  for (const Term& t : link.follow) s.Q_ddot[static_cast<size_t>(t.component)] += t.value * (q_dot[t.k] * q_dot[t.l]);
 }
 
-/// The inverse of a symmetric positive definite matrix by L D L^T, n x n. Returns the least pivot over the element of
-/// the diagonal that it came from.
+/// The inverse of a symmetric positive definite matrix, n x n, by sweeps of its diagonal: loops over rows, which fill
+/// registers. `row`: n. Returns the least pivot, which is that of L D L^T, over the element of the diagonal that it
+/// came from.
 template <class T>
-double invert(size_t n, const std::vector<T>& matrix, std::vector<T>& A, std::vector<T>& inverse) {
-  A = matrix;
+double invert(size_t n, const std::vector<T>& matrix, std::vector<T>& row, std::vector<T>& inverse) {
+  inverse = matrix;  // below the diagonal; swept all, less its inverse
   double least = 1;
-  for (size_t j = 0; j < n; ++j) {  // L below the diagonal, 1/D on it; L D in rows to come
-    const double before = value_of(A[j * n + j]);
-    for (size_t k = 0; k < j; ++k) {
-      const T LD = A[j * n + k];
-      A[j * n + k] = LD * A[k * n + k];
-      A[j * n + j] -= LD * A[j * n + k];
+  for (size_t j = 0; j < n; ++j) {
+    T* const A_j = inverse.data() + j * n;
+    least = std::min(least, value_of(A_j[j]) / value_of(matrix[j * n + j]));
+    const T of_pivot = T(1.0) / A_j[j];
+    for (size_t k = 0; k < n; ++k) row[k] = k < j ? A_j[k] : inverse[k * n + j];
+    for (size_t i = 0; i < n; ++i) {
+      T* const A_i = inverse.data() + i * n;
+      const T share = row[i] * of_pivot;
+      for (size_t k = 0; k <= i; ++k) A_i[k] -= share * row[k];
+      if (i > j) A_i[j] = share;
     }
-    least = std::min(least, value_of(A[j * n + j]) / before);
-    A[j * n + j] = T(1.0) / A[j * n + j];
-    for (size_t i = j + 1; i < n; ++i)
-      for (size_t k = 0; k < j; ++k) A[i * n + j] -= A[i * n + k] * A[j * n + k];
+    for (size_t k = 0; k < j; ++k) A_j[k] = row[k] * of_pivot;
+    A_j[j] = -of_pivot;
   }
-  for (size_t c = 0; c < n; ++c) {  // column c from row c on; the rest is its mirror image
-    for (size_t i = c; i < n; ++i) {
-      T x(i == c ? 1.0 : 0.0);
-      for (size_t k = c; k < i; ++k) x -= A[i * n + k] * inverse[k * n + c];
-      inverse[i * n + c] = x;
-    }
-    for (size_t i = n; i-- > c;) {
-      T x = inverse[i * n + c] * A[i * n + i];
-      for (size_t k = i + 1; k < n; ++k) x -= A[k * n + i] * inverse[k * n + c];
-      inverse[i * n + c] = x;
-    }
-  }
-  for (size_t c = 0; c < n; ++c)
-    for (size_t i = 0; i < c; ++i) inverse[i * n + c] = inverse[c * n + i];
+  for (size_t i = 0; i < n; ++i)
+    for (size_t k = 0; k <= i; ++k) inverse[k * n + i] = inverse[i * n + k] = -inverse[i * n + k];
   return least;
 }
 

@@ -29,7 +29,7 @@ struct SecondOrderScratch {
   std::vector<T> slope;                   // dQ_a/dq_k, r x n
   equations::BodyScratch<T> shapes;       // of all shapes
   std::vector<Vec3<T>> Ct, Gt;            // Ct(q), Me(q)^-1 Ct(q)^T, n
-  std::vector<T> Me, factor, Me_inverse;  // Me(q), L D L^T of it, its inverse, n x n
+  std::vector<T> Me, Me_inverse, row;     // Me(q) and its inverse, n x n; n of them while it is inverted
   double least_pivot = 1;                 // of Me(q), over the element of its diagonal
 };
 
@@ -140,7 +140,7 @@ struct Scratch {
         const size_t r = link.followers();
         o.Q.resize(n + r), o.Q_dot.resize(n + r), o.Q_ddot.resize(r), o.slope.resize(r * n);
         o.shapes = equations::BodyScratch<T>(n + r, link.shapes.J2.rows.size());
-        o.Ct.resize(n), o.Gt.resize(n), o.Me.resize(n * n), o.factor.resize(n * n), o.Me_inverse.resize(n * n);
+        o.Ct.resize(n), o.Gt.resize(n), o.Me.resize(n * n), o.row.resize(n), o.Me_inverse.resize(n * n);
       }
       s.hung.resize(k), s.place.resize(k);
       s.U.resize(k * n), s.P.resize(k * n);
