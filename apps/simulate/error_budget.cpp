@@ -2,154 +2,19 @@
 
 #include "apps/model/bounded_modes.hpp"
 #include "apps/model/prepared_body.hpp"
-#include "apps/model/static_shapes.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <map>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 namespace flexboom {
 
-namespace {
-
-using Richer = std::optional<ReducedBody> RicherBodies::*;
-
-bool has(const BodyScene& b, Richer richer) { return b.richer && ((*b.richer).*richer).has_value(); }
-
-std::map<std::string, int> kinds_of(const PreparedBody& p) {
-  std::map<std::string, int> kinds;
-  for (int k = 0; k < p.coordinates_of_modes(); ++k) ++kinds[p.body.coordinates[static_cast<size_t>(k)].kind];
-  return kinds;
-}
-
-/// Where the modes of a body are among all that bend in either plane, twist or stretch it. `whole` is the body with all
-/// shapes of its directions, `all` with those of all directions. The n-th of a kind here is the n-th of it there.
-std::vector<int> places_of(const BodyScene& b, const PreparedBody& whole, const PreparedBody& all) {
-  std::map<std::string, std::vector<int>> of_kind;
-  for (const Coordinate& c : all.body.coordinates)
-    of_kind[c.kind].push_back(static_cast<int>(&c - all.body.coordinates.data()) + 1);
-  std::map<std::string, size_t> count;
-  std::vector<int> places;
-  for (int k = 1; k <= whole.body.n(); ++k) {
-    const std::string& kind = whole.body.coordinates[static_cast<size_t>(k) - 1].kind;
-    const size_t n = count[kind]++;
-    const bool is_own = b.shapes.empty() || std::ranges::find(b.shapes, k) != b.shapes.end();
-    if (is_own && n < of_kind[kind].size()) places.push_back(of_kind[kind][n]);
-  }
-  return places;
-}
-
-/// The lowest modes of all directions: the `highest` that is kept, and enough beyond those of each kind in `kinds`.
-/// Those of beams go on until some stretch and some twist; where none do, static shapes stand for them.
-/// What lies beyond `resolved` the elements do not know.
-BodyScene with_modes_beyond(BodyScene b, int highest, int resolved, const ModesBeyond& more,
-                            const std::map<std::string, int>& kinds, const std::filesystem::path& keep,
-                            const RunHooks& hooks) {
-  constexpr int most = 64;
-  b.shapes.clear();
-  b.directions = "all";
-  for (int i = 1;; i *= 2) {
-    const int wanted = std::max(highest, std::min(highest + 2 * i * more.of(0), resolved));
-    b = with_modes(std::move(b), wanted, keep, hooks);
-    const PreparedBody all = prepared(b, 0, keep, hooks);
-    std::map<std::string, int> count = kinds_of(all);
-    const bool enough =
-        std::ranges::all_of(kinds, [&](const auto& k) { return count[k.first] >= k.second + more.of(k.second); });
-    const std::vector<std::string> statics = static_shapes_beside(all.body, b.clamp);
-    const bool has_more = b.modes == wanted && wanted < std::min(highest + most, resolved);
-    if (has_more && (!enough || (b.structure == "beam" && !statics.empty()))) continue;
-    return with_static_shapes(b, statics);
-  }
-}
-
-/// Its own modes and the lowest beside them: half as many of kinds that it has not.
-BodyScene with_more_of_each_kind(const BodyScene& b, const ModesBeyond& more, const std::filesystem::path& keep,
-                                 const RunHooks& hooks) {
-  const bool in_plane = b.directions != "all";
-  BodyScene own = b;
-  own.shapes.clear();
-  const std::map<std::string, int> kinds = kinds_of(prepared(b, 0, keep, hooks));
-  const PreparedBody whole = prepared(own, 0, keep, hooks);
-  const int dofs = b.modes > 0 ? whole.dofs : prepared(with_modes(own, 2, keep, hooks), 0, keep, hooks).dofs;
-  const int resolved = dofs > 0 ? dofs / 2 : std::numeric_limits<int>::max();  // a closed form has all
-  BodyScene richer = with_modes_beyond(b, in_plane ? 2 * b.modes : b.modes, resolved, more, kinds, keep, hooks);
-  const PreparedBody all = prepared(richer, 0, keep, hooks);
-  const std::vector<int> places = places_of(b, whole, all);
-  std::map<std::string, int> beside;
-  for (int k = 1; k <= all.coordinates_of_modes(); ++k) {
-    const std::string& kind = all.body.coordinates[static_cast<size_t>(k) - 1].kind;
-    const auto own_kind = kinds.find(kind);
-    const int of_kind = own_kind != kinds.end() ? more.of(own_kind->second)
-                        : kinds.empty()         ? more.of(0)
-                                                : more.of(0) / 2;
-    if (std::ranges::find(places, k) != places.end() || ++beside[kind] <= of_kind) richer.shapes.push_back(k);
-  }
-  return richer;
-}
-
-}  // namespace
-
-BodyScene with_modes(BodyScene b, int wanted, const std::filesystem::path& keep, const RunHooks& hooks) {
-  b.shapes.clear();
-  for (b.modes = wanted; b.modes > 2;) {
-    try {
-      prepared(b, 0, keep, hooks);
-      break;
-    } catch (const InputError&) {  // that is another fault where two modes have it, too
-      b.modes -= 2;
-    } catch (const NumericalError&) {  // nearly all modes of the elements: the last are beyond any solver
-      b.modes -= std::max(2, b.modes / 4);
-    }
-  }
-  b.modes = std::max(b.modes, std::min(wanted, 2));
-  return b;
-}
-
-Scene with_more_modes(Scene scene, const ModesBeyond& more, const RunHooks& hooks) {
-  for (BodyScene& b : scene.bodies) {
-    if (has(b, &RicherBodies::more_modes)) {
-      b.reduced = {b.richer, &*b.richer->more_modes};
-      b.richer = nullptr;  // of those modes there is nothing finer
-    }
-    if (b.structure == "rigid" || !b.is_boom()) continue;
-    if (b.basis.name == "clamped") {
-      b = with_more_of_each_kind(b, more, scene.bodies_kept_in, hooks);
-      b = with_static_shapes(b, static_shapes_of_loads(scene, b));
-      continue;
-    }
-    const int per_plane = b.directions == "all" ? (b.modes + 1) / 2 : b.modes;
-    b.modes = 2 * (per_plane + more.of(per_plane));
-    b.directions = "all";
-    b.shapes.clear();
-  }
-  return scene;
-}
-
 long bearable_steps(const Run& run) { return 20 * run.motion.summary.steps + 10000; }
-
-Scene without_kinds(Scene scene, const StillKinds& still, const RunHooks& hooks) {
-  for (BodyScene& b : scene.bodies) {
-    const auto kinds = still.find(b.name);
-    if (kinds == still.end() || kinds->second.empty()) continue;
-    const PreparedBody p = prepared(b, 0, scene.bodies_kept_in, hooks);
-    std::vector<int> moving;
-    const auto modes = static_cast<size_t>(p.coordinates_of_modes());
-    for (size_t k = 0; k < modes; ++k)
-      if (!kinds->second.contains(p.body.coordinates[k].kind))
-        moving.push_back(p.shapes.empty() ? static_cast<int>(k) + 1 : p.shapes[k]);
-    if (moving.size() == modes) continue;
-    b.shapes = std::move(moving);
-    if (b.shapes.empty()) b.modes = 0;
-  }
-  return scene;
-}
 
 OutputTable without_coordinates(const OutputTable& table) {
   OutputTable r;
@@ -180,6 +45,10 @@ Scene as_flown(Scene scene, const Run& run) {
 }
 
 namespace {
+
+using Richer = std::optional<ReducedBody> RicherBodies::*;
+
+bool has(const BodyScene& b, Richer richer) { return b.richer && ((*b.richer).*richer).has_value(); }
 
 /// Does the model of any body leave elasticity or modes out? What is said to be rigid is.
 bool any_elastic(const Scene& scene, std::string_view structure = "") {
@@ -218,29 +87,66 @@ Finer finer_elements(const Scene& scene) {
   return r;
 }
 
+/// Flies a scene again, and compares.
+struct Repeats {
+  RunHooks hooks;
+  OutputFloors floors;
+
+  bool stopped() const { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
+
+  /// Another flight at a bearable cost.
+  Run repeated(const Run& run, const Scene& other, int refine = 0) const {
+    return run_once(other, hooks, refine, bearable_steps(run));
+  }
+
+  std::vector<OutputDifference> difference(const Run& run, const Run& other, const Scene& scene) const {
+    return compare_outputs(without_coordinates(run.outputs), without_coordinates(other.outputs), scene.outputs, floors);
+  }
+
+  /// Differences of the outputs of another flight. Those that count must not be its own errors of time, which contacts
+  /// can make many tolerances: it is flown again with a digit more, where they are not far beyond that.
+  std::vector<OutputDifference> change(const Run&, const Scene& other, int refine = 0) const;
+};
+
+/// What a repeat has found.
+struct Finding {
+  std::vector<OutputDifference> differences{};
+  double factor = 1;      // the error for each difference
+  std::string missing{};  // why nothing was found
+};
+
+/// What `repeat` finds; the run that is repeated outlives its failure.
+template <class Repeat>
+Finding found(const Repeat& repeat) {
+  try {
+    return repeat();
+  } catch (const std::runtime_error& e) {
+    return {.missing = e.what()};
+  }
+}
+
 using Part = double OutputErrors::*;
 
 /// What fills a budget.
 struct Measuring {
-  const RunHooks& hooks;
+  Repeats repeats;
   std::vector<std::string>& plan;
-  OutputFloors floors;
   ErrorBudget budget{};
 
-  bool stopped() const { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
+  bool stopped() const { return repeats.stopped(); }
 
   void missing(std::string_view part, std::string_view why) {
     budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
   }
 
-  /// Enters what a repeat has changed in each output, `factor` times, and `more` of the largest value of each. Returns
-  /// the largest.
-  double enter(Part part, const std::vector<OutputDifference>& differences, double more = 0, double factor = 1) {
+  /// Enters what a repeat has changed in each output, and `more` of the largest value of each. Returns the largest.
+  double enter(Part part, const Finding& finding, double more = 0) {
     double most = 0;
     for (OutputErrors& o : budget.outputs) {
-      const auto d = std::ranges::find(differences, o.name, &OutputDifference::name);
-      const double error = d == differences.end() ? 0 : factor * d->error, before = worst_part(o);
-      if (d != differences.end()) o.scale = std::max(o.scale, d->scale), o.size = std::max(o.size, d->size);
+      const auto d = std::ranges::find(finding.differences, o.name, &OutputDifference::name);
+      const bool is_known = d != finding.differences.end();
+      const double error = is_known ? finding.factor * d->error : 0, before = worst_part(o);
+      if (is_known) o.scale = std::max(o.scale, d->scale), o.size = std::max(o.size, d->size);
       o.*part = error + (o.scale > 0 ? more * o.size / o.scale : 0);
       if (error > before) o.when = d->time;
       most = std::max(most, o.*part);
@@ -248,15 +154,11 @@ struct Measuring {
     return most;
   }
 
-  /// What `repeat` says; the run that is repeated outlives its failure.
-  template <class Repeat>
-  double measured(std::string_view part, const Repeat& repeat) {
-    try {
-      return repeat();
-    } catch (const std::runtime_error& e) {
-      missing(part, e.what());
-      return unknown;
-    }
+  /// The same, or what is missing; `name`: of the part.
+  double enter_found(Part part, std::string_view name, const Finding& finding) {
+    if (finding.missing.empty()) return enter(part, finding);
+    missing(name, finding.missing);
+    return unknown;
   }
 
  private:
@@ -276,42 +178,51 @@ Scene with_a_digit_more(Scene scene) {
   return scene;
 }
 
-/// Another flight at a bearable cost.
-Run repeated(const Run& run, const Scene& other, int refine, const Measuring& m) {
-  return run_once(other, m.hooks, refine, bearable_steps(run));
-}
-
-std::vector<OutputDifference> difference(const Run& run, const Run& other, const Scene& scene, const Measuring& m) {
-  return compare_outputs(without_coordinates(run.outputs), without_coordinates(other.outputs), scene.outputs, m.floors);
-}
-
-/// Differences of the outputs of another flight. Those that count must not be its own errors of time, which contacts
-/// can make many tolerances: it is flown again with a digit more, where they are not far beyond that.
-std::vector<OutputDifference> change(const Run& run, Scene other, int refine, const Measuring& m) {
+std::vector<OutputDifference> Repeats::change(const Run& run, const Scene& other, int refine) const {
   constexpr double counts = 1.0 / 3, beyond_doubt = 100;  // times the tolerance
-  std::vector<OutputDifference> differences = difference(run, repeated(run, other, refine, m), other, m);
-  const double most = largest(differences) / m.floors.tolerance;
-  if (!(most > counts && most < beyond_doubt) || m.stopped()) return differences;
-  return difference(run, repeated(run, with_a_digit_more(other), refine, m), other, m);
+  std::vector<OutputDifference> differences = difference(run, repeated(run, other, refine), other);
+  const double most = largest(differences) / floors.tolerance;
+  if (!(most > counts && most < beyond_doubt) || stopped()) return differences;
+  return difference(run, repeated(run, with_a_digit_more(other), refine), other);
 }
 
 /// The modes left out, first with few digits: more only where the answer would drown in the error of time integration.
 /// A jump of an acceleration rings all modes of a body, and a load of its joint converges like their effective mass: as
 /// 1 / n. What as many modes more change is then half of the error.
-double truncation_error(const Run& run, const Scene& flown, const StillKinds& still, Measuring& m) {
-  const bool loads = std::ranges::any_of(m.budget.outputs, is_load, &OutputErrors::name);
-  Scene more = without_kinds(with_more_modes(flown, {.as_many = loads}, m.hooks), still, m.hooks);
+Finding modes_beyond(const Run& run, const Scene& flown, const StillKinds& still, bool loads, const Repeats& repeats) {
+  Scene more = without_kinds(with_more_modes(flown, {.as_many = loads}, repeats.hooks), still, repeats.hooks);
   constexpr double few_digits = 1e-5;
   const bool has_many = flown.integrator_tolerance == 0 && flown.tolerance < few_digits;
   if (has_many) more.tolerance = few_digits;
-  std::vector<OutputDifference> differences = change(run, more, 0, m);
-  if (has_many && largest(differences) <= 10 * few_digits) {
+  Finding r{repeats.change(run, more)};
+  if (has_many && largest(r.differences) <= 10 * few_digits) {
     more.tolerance = flown.tolerance;
-    differences = change(run, more, 0, m);
+    r.differences = repeats.change(run, more);
   }
-  for (OutputDifference& d : differences)
+  for (OutputDifference& d : r.differences)
     if (is_load(d.name)) d.error *= 2;
-  return m.enter(&OutputErrors::truncation, differences);
+  return r;
+}
+
+/// The truncation.
+Finding truncation_of(const Scene& scene, const Run& run, const Scene& flown, const StillKinds& still, bool loads,
+                      const Repeats& repeats) {
+  if (const BodyScene* b = any_without(scene, &RicherBodies::more_modes))
+    return {.missing = fmt::format("body {} was reduced before, and its file has no more modes", b->name)};
+  if (!any_elastic(scene)) return {};
+  if (scene.from) return {.missing = "a saved state knows nothing of modes beyond its own"};
+  return found([&] { return modes_beyond(run, flown, still, loads, repeats); });
+}
+
+/// What finer elements change.
+Finding discretisation_of(const Scene& scene, const Run& run, const Scene& flown, const Repeats& repeats) {
+  if (const BodyScene* b = any_without(scene, &RicherBodies::finer_elements))
+    return {.missing = fmt::format("body {} was reduced before, and its file has no finer elements", b->name)};
+  if (!any_elastic(scene, "beam") && !any_elastic(scene, "solid")) return {};
+  return found([&]() -> Finding {
+    const Finer next = finer_elements(flown);
+    return {repeats.change(run, flown, next.steps), next.error_per_change};
+  });
 }
 
 /// All that the scene leaves to the program.
@@ -359,21 +270,21 @@ double linearisation_error(const Scene& scene, Scene& flown, Run& run, Measuring
   std::vector<OutputDifference> differences;
   Run stiffened;
   if (leaves_stiffening_out(run)) {
-    stiffened = repeated(run, with_stiffening(flown), 0, m);
-    differences = difference(run, stiffened, flown, m);
+    stiffened = m.repeats.repeated(run, with_stiffening(flown));
+    differences = m.repeats.difference(run, stiffened, flown);
   }
   const double bearable = scene.tolerance / 3;
   if (largest(differences) > bearable && any_open_stiffening(scene, flown)) {
     flown = with_stiffening_left_open(scene, std::move(flown));
-    run = all_stiffening_is_on(flown) ? std::move(stiffened) : run_once(flown, m.hooks);
+    run = all_stiffening_is_on(flown) ? std::move(stiffened) : run_once(flown, m.repeats.hooks);
     m.plan.push_back(fmt::format("geometric stiffness changes the outputs by {:.1e}: the run that is kept has it",
                                  largest(differences)));
     differences.clear();
-    if (leaves_stiffening_out(run)) differences = change(run, with_stiffening(flown), 0, m);
+    if (leaves_stiffening_out(run)) differences = m.repeats.change(run, with_stiffening(flown));
   }
   double deflection = 0;
   for (const Bending& b : run.bending) deflection = std::max(deflection, b.of_length);
-  return m.enter(&OutputErrors::linearisation, differences, deflection * deflection);
+  return m.enter(&OutputErrors::linearisation, {differences}, deflection * deflection);
 }
 
 }  // namespace
@@ -406,46 +317,36 @@ std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const Ou
 
 ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan,
                            const StillKinds& still) {
-  Measuring m{hooks, plan, floors_of(scene, run.bodies)};
+  Measuring m{{hooks, floors_of(scene, run.bodies)}, plan};
   ErrorBudget& budget = m.budget;
   Scene flown = as_flown(scene, run);
-  for (const OutputDifference& d : compare_outputs(run.outputs, run.outputs, scene.outputs, m.floors)) {
+  for (const OutputDifference& d : compare_outputs(run.outputs, run.outputs, scene.outputs, m.repeats.floors)) {
     budget.outputs.push_back({});
     OutputErrors& o = budget.outputs.back();
     o.name = d.name, o.scale = d.scale, o.size = d.size;
   }
-  budget.linearisation = m.measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
-  const auto is_missing = [&](std::string_view part, Richer richer, std::string_view what) {
-    const BodyScene* b = any_without(scene, richer);
-    if (b != nullptr) m.missing(part, fmt::format("body {} was reduced before, and its file has no {}", b->name, what));
-    return b != nullptr;
+  const auto measured = [&m](std::string_view part, const auto& repeat) {
+    try {
+      return repeat();
+    } catch (const std::runtime_error& e) {
+      m.missing(part, e.what());
+      return unknown;
+    }
   };
+  budget.linearisation = measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
   if (!m.stopped())
-    budget.time = m.measured("time", [&] {
+    budget.time = measured("time", [&] {
       constexpr int digits = 2;
-      return m.enter(&OutputErrors::time, settle_time_error(flown, run, m.floors, digits, m.hooks, m.plan));
+      return m.enter(&OutputErrors::time, {settle_time_error(flown, run, m.repeats.floors, digits, hooks, m.plan)});
     });
   scene.integrator_tolerance = flown.integrator_tolerance;
-  const auto none = [&m](Part part) { return m.enter(part, {}); };
-  const bool elastic = any_elastic(scene);
-  if (!m.stopped() && !is_missing("truncation", &RicherBodies::more_modes, "more modes")) {
-    if (scene.from && elastic)
-      m.missing("truncation", "a saved state knows nothing of modes beyond its own");
-    else if (elastic)
-      budget.truncation = m.measured("truncation", [&] { return truncation_error(run, flown, still, m); });
-    else
-      budget.truncation = none(&OutputErrors::truncation);
-  }
-  if (!m.stopped() && !is_missing("discretisation", &RicherBodies::finer_elements, "finer elements")) {
-    const auto finer = [&] {
-      const Finer next = finer_elements(flown);
-      return m.enter(&OutputErrors::discretisation, change(run, flown, next.steps, m), 0, next.error_per_change);
-    };
-    if (any_elastic(scene, "beam") || any_elastic(scene, "solid"))
-      budget.discretisation = m.measured("discretisation", finer);
-    else
-      budget.discretisation = none(&OutputErrors::discretisation);
-  }
+  const bool loads = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name);
+  if (!m.stopped())
+    budget.truncation = m.enter_found(&OutputErrors::truncation, "truncation",
+                                      truncation_of(scene, run, flown, still, loads, m.repeats));
+  if (!m.stopped())
+    budget.discretisation =
+        m.enter_found(&OutputErrors::discretisation, "discretisation", discretisation_of(scene, run, flown, m.repeats));
   budget.measured = !m.stopped();
   for (const std::string& line : budget.missing) plan.push_back("error budget: " + line);
   return budget;

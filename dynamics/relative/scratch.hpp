@@ -25,12 +25,12 @@ struct Eliminated {
 /// Of a body with second-order displacements: n coordinates, r shapes that follow them.
 template <class T>
 struct SecondOrderScratch {
-  std::vector<T> Q, Q_dot, Q_ddot;        // of all shapes, n + r; of the r alone, what q_ddot does not give
-  std::vector<T> slope;                   // dQ_a/dq_k, r x n
-  equations::BodyScratch<T> shapes;       // of all shapes
-  std::vector<Vec3<T>> Ct, Gt;            // Ct(q), Me(q)^-1 Ct(q)^T, n
-  std::vector<T> Me, Me_inverse, row;     // Me(q) and its inverse, n x n; n of them while it is inverted
-  double least_pivot = 1;                 // of Me(q), over the element of its diagonal
+  std::vector<T> Q, Q_dot, Q_ddot;     // of all shapes, n + r; of the r alone, what q_ddot does not give
+  std::vector<T> slope;                // dQ_a/dq_k, r x n
+  equations::BodyScratch<T> shapes;    // of all shapes
+  std::vector<Vec3<T>> Ct, Gt;         // Ct(q), Me(q)^-1 Ct(q)^T, n
+  std::vector<T> Me, Me_inverse, row;  // Me(q) and its inverse, n x n; n of them while it is inverted
+  double least_pivot = 1;              // of Me(q), over the element of its diagonal
 };
 
 template <class T>

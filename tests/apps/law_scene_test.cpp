@@ -86,10 +86,12 @@ void expect_same(const RunResult& a, const RunResult& b, double tolerance = 1e-6
     EXPECT_EQ(event_name(a.trajectory.events[i]), event_name(b.trajectory.events[i]));
     EXPECT_NEAR(a.trajectory.events[i].time, b.trajectory.events[i].time, tolerance);
   }
-  for (const OutputDifference& d : compare_outputs(a.outputs, b.outputs, {}))
+  for (const OutputDifference& d : compare_outputs(a.outputs, b.outputs, {})) {
     if (!d.name.starts_with("energy") && !d.name.ends_with("force") && !d.name.ends_with("torque") &&
-        !d.name.ends_with("position") && !d.name.ends_with("velocity"))
+        !d.name.ends_with("position") && !d.name.ends_with("velocity")) {
       EXPECT_LT(d.error, 100 * tolerance) << d.name;
+    }
+  }
   EXPECT_LT(a.trajectory.summary.energy_balance, 1e-7);
   EXPECT_LT(b.trajectory.summary.energy_balance, 1e-7);
   ASSERT_TRUE(a.ledger && b.ledger);

@@ -128,7 +128,7 @@ TEST(StaticShapes, ArePartOfAPlan) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formulations, StaticShapesOfJoints, testing::Values("relative", "multipliers"),
-                         [](const auto& info) { return info.param; });
+                         [](const auto& which) { return which.param; });
 
 }  // namespace
 }  // namespace flexboom

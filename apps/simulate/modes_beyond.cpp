@@ -1,0 +1,142 @@
+#include "apps/simulate/modes_beyond.hpp"
+
+#include "apps/model/prepared_body.hpp"
+#include "apps/model/static_shapes.hpp"
+#include "fem/base/check.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace flexboom {
+
+namespace {
+
+std::map<std::string, int> kinds_of(const PreparedBody& p) {
+  std::map<std::string, int> kinds;
+  for (int k = 0; k < p.coordinates_of_modes(); ++k) ++kinds[p.body.coordinates[static_cast<size_t>(k)].kind];
+  return kinds;
+}
+
+/// Where the modes of a body are among all that bend in either plane, twist or stretch it. `whole` is the body with all
+/// shapes of its directions, `all` with those of all directions. The n-th of a kind here is the n-th of it there.
+std::vector<int> places_of(const BodyScene& b, const PreparedBody& whole, const PreparedBody& all) {
+  std::map<std::string, std::vector<int>> of_kind;
+  for (const Coordinate& c : all.body.coordinates)
+    of_kind[c.kind].push_back(static_cast<int>(&c - all.body.coordinates.data()) + 1);
+  std::map<std::string, size_t> count;
+  std::vector<int> places;
+  for (int k = 1; k <= whole.body.n(); ++k) {
+    const std::string& kind = whole.body.coordinates[static_cast<size_t>(k) - 1].kind;
+    const size_t n = count[kind]++;
+    const bool is_own = b.shapes.empty() || std::ranges::find(b.shapes, k) != b.shapes.end();
+    if (is_own && n < of_kind[kind].size()) places.push_back(of_kind[kind][n]);
+  }
+  return places;
+}
+
+/// The lowest modes of all directions: the `highest` that is kept, and enough beyond those of each kind in `kinds`.
+/// Those of beams go on until some stretch and some twist; where none do, static shapes stand for them.
+/// What lies beyond `resolved` the elements do not know.
+BodyScene with_modes_beyond(BodyScene b, int highest, int resolved, const ModesBeyond& more,
+                            const std::map<std::string, int>& kinds, const std::filesystem::path& keep,
+                            const RunHooks& hooks) {
+  constexpr int most = 64;
+  b.shapes.clear();
+  b.directions = "all";
+  for (int i = 1;; i *= 2) {
+    const int wanted = std::max(highest, std::min(highest + 2 * i * more.of(0), resolved));
+    b = with_modes(std::move(b), wanted, keep, hooks);
+    const PreparedBody all = prepared(b, 0, keep, hooks);
+    std::map<std::string, int> count = kinds_of(all);
+    const bool enough =
+        std::ranges::all_of(kinds, [&](const auto& k) { return count[k.first] >= k.second + more.of(k.second); });
+    const std::vector<std::string> statics = static_shapes_beside(all.body, b.clamp);
+    const bool has_more = b.modes == wanted && wanted < std::min(highest + most, resolved);
+    if (has_more && (!enough || (b.structure == "beam" && !statics.empty()))) continue;
+    return with_static_shapes(b, statics);
+  }
+}
+
+/// Its own modes and the lowest beside them: half as many of kinds that it has not.
+BodyScene with_more_of_each_kind(const BodyScene& b, const ModesBeyond& more, const std::filesystem::path& keep,
+                                 const RunHooks& hooks) {
+  const bool in_plane = b.directions != "all";
+  BodyScene own = b;
+  own.shapes.clear();
+  const std::map<std::string, int> kinds = kinds_of(prepared(b, 0, keep, hooks));
+  const PreparedBody whole = prepared(own, 0, keep, hooks);
+  const int dofs = b.modes > 0 ? whole.dofs : prepared(with_modes(own, 2, keep, hooks), 0, keep, hooks).dofs;
+  const int resolved = dofs > 0 ? dofs / 2 : std::numeric_limits<int>::max();  // a closed form has all
+  BodyScene richer = with_modes_beyond(b, in_plane ? 2 * b.modes : b.modes, resolved, more, kinds, keep, hooks);
+  const PreparedBody all = prepared(richer, 0, keep, hooks);
+  const std::vector<int> places = places_of(b, whole, all);
+  std::map<std::string, int> beside;
+  for (int k = 1; k <= all.coordinates_of_modes(); ++k) {
+    const std::string& kind = all.body.coordinates[static_cast<size_t>(k) - 1].kind;
+    const auto own_kind = kinds.find(kind);
+    const int of_kind = own_kind != kinds.end() ? more.of(own_kind->second)
+                        : kinds.empty()         ? more.of(0)
+                                                : more.of(0) / 2;
+    if (std::ranges::find(places, k) != places.end() || ++beside[kind] <= of_kind) richer.shapes.push_back(k);
+  }
+  return richer;
+}
+
+}  // namespace
+
+BodyScene with_modes(BodyScene b, int wanted, const std::filesystem::path& keep, const RunHooks& hooks) {
+  b.shapes.clear();
+  for (b.modes = wanted; b.modes > 2;) {
+    try {
+      prepared(b, 0, keep, hooks);
+      break;
+    } catch (const InputError&) {  // that is another fault where two modes have it, too
+      b.modes -= 2;
+    } catch (const NumericalError&) {  // nearly all modes of the elements: the last are beyond any solver
+      b.modes -= std::max(2, b.modes / 4);
+    }
+  }
+  b.modes = std::max(b.modes, std::min(wanted, 2));
+  return b;
+}
+
+Scene with_more_modes(Scene scene, const ModesBeyond& more, const RunHooks& hooks) {
+  for (BodyScene& b : scene.bodies) {
+    if (b.richer && b.richer->more_modes) {
+      b.reduced = {b.richer, &*b.richer->more_modes};
+      b.richer = nullptr;  // of those modes there is nothing finer
+    }
+    if (b.structure == "rigid" || !b.is_boom()) continue;
+    if (b.basis.name == "clamped") {
+      b = with_more_of_each_kind(b, more, scene.bodies_kept_in, hooks);
+      b = with_static_shapes(b, static_shapes_of_loads(scene, b));
+      continue;
+    }
+    const int per_plane = b.directions == "all" ? (b.modes + 1) / 2 : b.modes;
+    b.modes = 2 * (per_plane + more.of(per_plane));
+    b.directions = "all";
+    b.shapes.clear();
+  }
+  return scene;
+}
+
+Scene without_kinds(Scene scene, const StillKinds& still, const RunHooks& hooks) {
+  for (BodyScene& b : scene.bodies) {
+    const auto kinds = still.find(b.name);
+    if (kinds == still.end() || kinds->second.empty()) continue;
+    const PreparedBody p = prepared(b, 0, scene.bodies_kept_in, hooks);
+    std::vector<int> moving;
+    const auto modes = static_cast<size_t>(p.coordinates_of_modes());
+    for (size_t k = 0; k < modes; ++k)
+      if (!kinds->second.contains(p.body.coordinates[k].kind))
+        moving.push_back(p.shapes.empty() ? static_cast<int>(k) + 1 : p.shapes[k]);
+    if (moving.size() == modes) continue;
+    b.shapes = std::move(moving);
+    if (b.shapes.empty()) b.modes = 0;
+  }
+  return scene;
+}
+
+}  // namespace flexboom
