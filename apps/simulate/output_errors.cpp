@@ -73,10 +73,15 @@ std::map<std::string_view, double> largest_of_units(const OutputTable& table) {
 /// An error of this size is no more than round-off, or does not count.
 double bearable(const std::string& output, const OutputFloors& floors, const std::map<std::string_view, double>& all) {
   const std::string_view unit = unit_of(output);
-  const auto found = all.find(unit);
-  double natural = found == all.end() ? 0 : found->second;
+  const auto largest_in = [&all](std::string_view of_unit) {
+    const auto found = all.find(of_unit);
+    return found == all.end() ? 0.0 : found->second;
+  };
+  double natural = largest_in(unit);
   if (unit == "rad") natural = std::max(natural, 1.0);
   if (unit == "m") natural = std::max(natural, floors.length);
+  if (unit == "m/s") natural = std::max(natural, floors.length * largest_in("rad/s"));
+  if (unit == "N m") natural = std::max(natural, floors.length * largest_in("N"));
   constexpr double round_off = 1e-14;
   double size = round_off * natural;
   for (const AbsoluteError& a : floors.absolute)

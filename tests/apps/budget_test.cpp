@@ -336,6 +336,22 @@ TEST(Budget, CoordinatesOfOtherBasesAreNotCompared) {
   EXPECT_EQ(kept.values.cols(), 2);
 }
 
+// Four wires that swing alike keep their hub at rest: what round-off makes of its velocity is weighed by the speed of
+// the wires.
+TEST(Budget, WhatSymmetryKeepsAtRestIsNoError) {
+  Scene scene = scene_named("wire-spinner");
+  scene.error_budget = true;
+  scene.tolerance = 1e-3;
+  scene.duration = 20;
+  const RunResult r = run_scene(scene, {});
+  const auto hub = std::ranges::find(r.budget.outputs, "hub.velocity", &OutputErrors::name);
+  ASSERT_NE(hub, r.budget.outputs.end());
+  EXPECT_LT(hub->size, 1e-10);
+  EXPECT_LT(hub->total(), 1e-3);
+  EXPECT_LT(r.budget.time, 1e-3);
+  EXPECT_EQ(r.scene.integrator_tolerance, 0) << "no digit more helps";
+}
+
 TEST(Tip, IsFoundWhateverItsSpelling) {
   const Scene plain = parse_scene(swing_on_joints, "plain.toml");
   const std::vector<std::string> names = outputs_of(plain);
