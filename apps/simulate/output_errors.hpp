@@ -42,8 +42,8 @@ struct OutputDifference {
 /// Over the outputs that both tables have and that are wanted (all when `wanted` is empty): max over time of |a - b|,
 /// by the largest |b| over time. With floors that is no less than what tolerance makes of an absolute error and of
 /// round-off: 1e-14 of a radian, of the scene's length, of that times the largest rate or force, or of the largest
-/// output of the same unit. An output with an
-/// accuracy of its own (as wanted_output) is scaled so that its error is `tolerance` where it has that accuracy.
+/// output of the same unit. An output with an accuracy of its own (as wanted_output) is scaled so that its error is
+/// `tolerance` where it has that accuracy.
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted, const OutputFloors& = {});
 

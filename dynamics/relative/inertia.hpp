@@ -77,7 +77,7 @@ void follow_coordinates(const Link& link, const T* q, const T* q_dot, SecondOrde
 /// came from.
 template <class T>
 double invert(size_t n, const std::vector<T>& matrix, std::vector<T>& row, std::vector<T>& inverse) {
-  inverse = matrix;  // below the diagonal; swept all, less its inverse
+  inverse = matrix;  // its lower triangle; all swept, it is minus the inverse
   double least = 1;
   for (size_t j = 0; j < n; ++j) {
     T* const A_j = inverse.data() + j * n;
