@@ -186,17 +186,19 @@ std::vector<OutputDifference> Repeats::change(const Run& run, const Scene& other
   return difference(run, repeated(run, with_a_digit_more(other), refine), other);
 }
 
-/// The modes left out, first with few digits: more only where the answer would drown in the error of time integration.
+/// The modes left out, first with few digits: more only where the answer would drown in the error of time integration,
+/// which is `noise` times the tolerance of the integrator.
 /// A jump of an acceleration rings all modes of a body, and a load of its joint converges like their effective mass: as
 /// 1 / n. What as many modes more change is then half of the error.
-Finding modes_beyond(const Run& run, const Scene& flown, const StillKinds& still, bool loads, const Repeats& repeats) {
+Finding modes_beyond(const Run& run, const Scene& flown, const StillKinds& still, bool loads, double noise,
+                     const Repeats& repeats) {
   Scene more = without_kinds(with_more_modes(flown, {.as_many = loads}, repeats.hooks), still, repeats.hooks);
   constexpr double few_digits = 1e-5;
-  const bool has_many = flown.integrator_tolerance == 0 && flown.tolerance < few_digits;
-  if (has_many) more.tolerance = few_digits;
+  const bool has_many = flown.tolerance < few_digits;
+  if (has_many) more.tolerance = few_digits, more.integrator_tolerance = 0;
   Finding r{repeats.change(run, more)};
-  if (has_many && largest(r.differences) <= 10 * few_digits) {
-    more.tolerance = flown.tolerance;
+  if (has_many && largest(r.differences) <= 10 * noise * few_digits) {
+    more.tolerance = flown.tolerance, more.integrator_tolerance = flown.integrator_tolerance;
     r.differences = repeats.change(run, more);
   }
   for (OutputDifference& d : r.differences)
@@ -205,13 +207,15 @@ Finding modes_beyond(const Run& run, const Scene& flown, const StillKinds& still
 }
 
 /// The truncation.
-Finding truncation_of(const Scene& scene, const Run& run, const Scene& flown, const StillKinds& still, bool loads,
-                      const Repeats& repeats) {
+Finding truncation_of(const Scene& scene, const Run& run, const Scene& flown, const StillKinds& still,
+                      const ErrorBudget& budget, const Repeats& repeats) {
   if (const BodyScene* b = any_without(scene, &RicherBodies::more_modes))
     return {.missing = fmt::format("body {} was reduced before, and its file has no more modes", b->name)};
   if (!any_elastic(scene)) return {};
   if (scene.from) return {.missing = "a saved state knows nothing of modes beyond its own"};
-  return found([&] { return modes_beyond(run, flown, still, loads, repeats); });
+  const bool loads = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name);
+  const double noise = budget.time > flown.step_tolerance() ? budget.time / flown.step_tolerance() : 1;
+  return found([&] { return modes_beyond(run, flown, still, loads, noise, repeats); });
 }
 
 /// What finer elements change.
@@ -340,10 +344,9 @@ ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::v
       return m.enter(&OutputErrors::time, {settle_time_error(flown, run, m.repeats.floors, digits, hooks, m.plan)});
     });
   scene.integrator_tolerance = flown.integrator_tolerance;
-  const bool loads = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name);
   if (!m.stopped())
     budget.truncation = m.enter_found(&OutputErrors::truncation, "truncation",
-                                      truncation_of(scene, run, flown, still, loads, m.repeats));
+                                      truncation_of(scene, run, flown, still, budget, m.repeats));
   if (!m.stopped())
     budget.discretisation =
         m.enter_found(&OutputErrors::discretisation, "discretisation", discretisation_of(scene, run, flown, m.repeats));
