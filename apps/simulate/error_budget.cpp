@@ -57,13 +57,14 @@ bool any_elastic(const Scene& scene, std::string_view structure = "") {
   });
 }
 
-/// The first body from a file that has no such richer one, though its model has more to say.
-const BodyScene* any_without(const Scene& scene, Richer richer) {
-  const auto found = std::ranges::find_if(scene.bodies, [&](const BodyScene& b) {
+/// @throws InputError where a body from a file has no such richer one, though its model has more to say; `what`: in
+/// words.
+void require_richer(const Scene& scene, Richer richer, std::string_view what) {
+  for (const BodyScene& b : scene.bodies) {
     const bool is_exact = richer == &RicherBodies::finer_elements && b.structure == "eq14";
-    return b.reduced && b.reduced->structure != "rigid" && !is_exact && !has(b, richer);
-  });
-  return found == scene.bodies.end() ? nullptr : &*found;
+    if (b.reduced && b.reduced->structure != "rigid" && !is_exact && !has(b, richer))
+      throw InputError(fmt::format("body {} was reduced before, and its file has no {}", b.name, what));
+  }
 }
 
 /// How a discretisation is compared: elements so many steps finer, and the error at most for each change by them.
@@ -92,8 +93,6 @@ struct Repeats {
   RunHooks hooks;
   OutputFloors floors;
 
-  bool stopped() const { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
-
   /// Another flight at a bearable cost.
   Run repeated(const Run& run, const Scene& other, int refine = 0) const {
     return run_once(other, hooks, refine, bearable_steps(run));
@@ -111,19 +110,8 @@ struct Repeats {
 /// What a repeat has found.
 struct Finding {
   std::vector<OutputDifference> differences{};
-  double factor = 1;      // the error for each difference
-  std::string missing{};  // why nothing was found
+  double factor = 1;  // the error for each difference
 };
-
-/// What `repeat` finds; the run that is repeated outlives its failure.
-template <class Repeat>
-Finding found(const Repeat& repeat) {
-  try {
-    return repeat();
-  } catch (const std::runtime_error& e) {
-    return {.missing = e.what()};
-  }
-}
 
 using Part = double OutputErrors::*;
 
@@ -132,8 +120,6 @@ struct Measuring {
   Repeats repeats;
   std::vector<std::string>& plan;
   ErrorBudget budget{};
-
-  bool stopped() const { return repeats.stopped(); }
 
   void missing(std::string_view part, std::string_view why) {
     budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
@@ -152,13 +138,6 @@ struct Measuring {
       most = std::max(most, o.*part);
     }
     return most;
-  }
-
-  /// The same, or what is missing; `name`: of the part.
-  double enter_found(Part part, std::string_view name, const Finding& finding) {
-    if (finding.missing.empty()) return enter(part, finding);
-    missing(name, finding.missing);
-    return unknown;
   }
 
  private:
@@ -182,7 +161,7 @@ std::vector<OutputDifference> Repeats::change(const Run& run, const Scene& other
   constexpr double counts = 1.0 / 3, beyond_doubt = 100;  // times the tolerance
   std::vector<OutputDifference> differences = difference(run, repeated(run, other, refine), other);
   const double most = largest(differences) / floors.tolerance;
-  if (!(most > counts && most < beyond_doubt) || stopped()) return differences;
+  if (!(most > counts && most < beyond_doubt) || hooks.stopped()) return differences;
   return difference(run, repeated(run, with_a_digit_more(other), refine), other);
 }
 
@@ -206,27 +185,23 @@ Finding modes_beyond(const Run& run, const Scene& flown, const StillKinds& still
   return r;
 }
 
-/// The truncation.
+/// The truncation. @throws InputError where the scene has no more modes.
 Finding truncation_of(const Scene& scene, const Run& run, const Scene& flown, const StillKinds& still,
                       const ErrorBudget& budget, const Repeats& repeats) {
-  if (const BodyScene* b = any_without(scene, &RicherBodies::more_modes))
-    return {.missing = fmt::format("body {} was reduced before, and its file has no more modes", b->name)};
+  require_richer(scene, &RicherBodies::more_modes, "more modes");
   if (!any_elastic(scene)) return {};
-  if (scene.from) return {.missing = "a saved state knows nothing of modes beyond its own"};
+  if (scene.from) throw InputError("a saved state knows nothing of modes beyond its own");
   const bool loads = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name);
   const double noise = budget.time > flown.step_tolerance() ? budget.time / flown.step_tolerance() : 1;
-  return found([&] { return modes_beyond(run, flown, still, loads, noise, repeats); });
+  return modes_beyond(run, flown, still, loads, noise, repeats);
 }
 
-/// What finer elements change.
+/// What finer elements change. @throws InputError where the scene has none.
 Finding discretisation_of(const Scene& scene, const Run& run, const Scene& flown, const Repeats& repeats) {
-  if (const BodyScene* b = any_without(scene, &RicherBodies::finer_elements))
-    return {.missing = fmt::format("body {} was reduced before, and its file has no finer elements", b->name)};
+  require_richer(scene, &RicherBodies::finer_elements, "finer elements");
   if (!any_elastic(scene, "beam") && !any_elastic(scene, "solid")) return {};
-  return found([&]() -> Finding {
-    const Finer next = finer_elements(flown);
-    return {repeats.change(run, flown, next.steps), next.error_per_change};
-  });
+  const Finer next = finer_elements(flown);
+  return {repeats.change(run, flown, next.steps), next.error_per_change};
 }
 
 /// All that the scene leaves to the program.
@@ -308,8 +283,7 @@ std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const Ou
     Run finer = run_once(tight, hooks, 0, bearable_steps(run));
     std::vector<OutputDifference> differences = compare_outputs(run.outputs, finer.outputs, flown.outputs, floors);
     const double error = largest(differences);
-    const bool is_stopped = hooks.interrupt != nullptr && hooks.interrupt->load();
-    if (error <= flown.tolerance / 3 || digits == 0 || is_stopped || tight.step_tolerance() < least_tolerance)
+    if (error <= flown.tolerance / 3 || digits == 0 || hooks.stopped() || tight.step_tolerance() < least_tolerance)
       return differences;
     plan.push_back(fmt::format(
         "time integration: changed by {:.1e} at a tenth of the tolerance {:.0e}; the integrator gets {:.0e}", error,
@@ -329,8 +303,9 @@ ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::v
     OutputErrors& o = budget.outputs.back();
     o.name = d.name, o.scale = d.scale, o.size = d.size;
   }
-  const auto measured = [&m](std::string_view part, const auto& repeat) {
-    try {
+  const auto measured = [&m, &hooks](std::string_view part, const auto& repeat) {
+    if (hooks.stopped()) return unknown;
+    try {  // the run that is repeated outlives a failure
       return repeat();
     } catch (const std::runtime_error& e) {
       m.missing(part, e.what());
@@ -338,19 +313,18 @@ ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::v
     }
   };
   budget.linearisation = measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
-  if (!m.stopped())
-    budget.time = measured("time", [&] {
-      constexpr int digits = 2;
-      return m.enter(&OutputErrors::time, {settle_time_error(flown, run, m.repeats.floors, digits, hooks, m.plan)});
-    });
+  budget.time = measured("time", [&] {
+    constexpr int digits = 2;
+    return m.enter(&OutputErrors::time, {settle_time_error(flown, run, m.repeats.floors, digits, hooks, m.plan)});
+  });
   scene.integrator_tolerance = flown.integrator_tolerance;
-  if (!m.stopped())
-    budget.truncation = m.enter_found(&OutputErrors::truncation, "truncation",
-                                      truncation_of(scene, run, flown, still, budget, m.repeats));
-  if (!m.stopped())
-    budget.discretisation =
-        m.enter_found(&OutputErrors::discretisation, "discretisation", discretisation_of(scene, run, flown, m.repeats));
-  budget.measured = !m.stopped();
+  budget.truncation = measured("truncation", [&] {
+    return m.enter(&OutputErrors::truncation, truncation_of(scene, run, flown, still, budget, m.repeats));
+  });
+  budget.discretisation = measured("discretisation", [&] {
+    return m.enter(&OutputErrors::discretisation, discretisation_of(scene, run, flown, m.repeats));
+  });
+  budget.measured = !hooks.stopped();
   for (const std::string& line : budget.missing) plan.push_back("error budget: " + line);
   return budget;
 }

@@ -37,8 +37,6 @@ constexpr double not_near = 10;      // times the tolerance: more modes that har
 constexpr int most_doublings = 2;    // of the candidates, before a budget shows what they leave out
 constexpr double nearly_all = 0.85;  // of the candidates: where so many are needed, more would be, too
 
-bool stopped(const RunHooks& hooks) { return hooks.interrupt != nullptr && hooks.interrupt->load(); }
-
 /// The largest |q| of every coordinate of a body.
 VectorXd amplitudes(const Run& run, const ReducedBody& body) {
   const auto first = std::ranges::find(run.outputs.names, body.name + ".q1") - run.outputs.names.begin();
@@ -170,7 +168,7 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
     return run_once(all, hooks, 0, max_steps);
   };
   const long bearable = 2 * bearable_steps(few);  // of a tighter tolerance
-  for (; candidates_ > fewest && !stopped(hooks); candidates_ /= 2) {
+  for (; candidates_ > fewest && !hooks.stopped(); candidates_ /= 2) {
     try {
       Run made = run(candidates_, bearable);
       costly_ = costly_ || made.motion.summary.steps > bearable / 3;  // with more of them it will not be bearable
@@ -202,7 +200,7 @@ bool Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::strin
     given.integrator_tolerance = scene.integrator_tolerance;
     const bool is_enough = choice->needed < (given.error_budget ? nearly_all : 1);
     hopeless_ = given.error_budget && !is_enough && choice->error_of_fewer > not_near * scene.tolerance;
-    if (is_enough || stopped(hooks)) return true;
+    if (is_enough || hooks.stopped()) return true;
     if (step == most_doublings || costly_ || hopeless_ || 2 * candidates_ > most_candidates) break;
     candidates_ *= 2;
     plan.push_back(
@@ -254,7 +252,7 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
   if (too_few > 0) next = too_few + too_few / 8;
   double error = 0, error_of_fewer = 0;
   const auto is_settled = [&] { return enough <= too_few + enough / 16; };  // a trial costs more than these would save
-  for (int i = 0; i < most_trials && !is_settled() && !stopped(hooks); ++i) {
+  for (int i = 0; i < most_trials && !is_settled() && !hooks.stopped(); ++i) {
     const size_t count = std::min(next, enough - 1);
     const double e = error_with(count);
     const bool is_enough = e <= scene.tolerance / 3;
@@ -294,7 +292,7 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
 
 bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {
   const OutputErrors* worst = budget.worst();
-  if (open_.empty() || !budget.measured || budget.within(scene.tolerance) || worst == nullptr || stopped(hooks) ||
+  if (open_.empty() || !budget.measured || budget.within(scene.tolerance) || worst == nullptr || hooks.stopped() ||
       steps_++ >= most_rounds)
     return false;
   const auto known = [](double part) { return std::isnan(part) ? 0 : part; };
@@ -315,7 +313,7 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
                                worst->truncation, worst->name, candidates_));
     const Scene fewer = scene;
     for (const size_t i : open_) scene.bodies[i].modes_auto = true;
-    const bool has_chosen = choose(scene, hooks, plan) && !stopped(hooks);
+    const bool has_chosen = choose(scene, hooks, plan) && !hooks.stopped();
     if (!has_chosen) scene = fewer;
     return has_chosen;
   }

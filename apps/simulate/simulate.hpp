@@ -53,6 +53,8 @@ struct RunHooks {
   /// Told at every checkpoint of a flight: the run so far, whose rows begin with row `first` of the flight. Its end is
   /// the state there. Row 0 comes again where the flight begins anew.
   std::function<void(Run so_far, size_t first)> checkpoint{};
+
+  bool stopped() const { return interrupt != nullptr && interrupt->load(); }
 };
 
 /// The whole chain. `so_far`: told of the run itself as RunHooks::checkpoint, not of its repeats.

@@ -59,7 +59,7 @@ std::vector<ReferenceCheck> reference_checks(const RunResult& r, const RunHooks&
   quiet.interrupt = hooks.interrupt, quiet.bodies = hooks.bodies;
   std::vector<ReferenceCheck> checks;
   for (const Reference& reference : references(scene, r.trajectory.summary.method, quiet)) {
-    if (hooks.interrupt != nullptr && hooks.interrupt->load()) break;
+    if (hooks.stopped()) break;
     ReferenceCheck check;
     check.what = reference.what;
     try {

@@ -208,13 +208,12 @@ class ExponentialStepper final : public Stepper {
     const auto hold = [](MatrixXd& J, const SplitLayout::Coordinate& c) {
       if (J.col(c.value).cwiseAbs().maxCoeff() < pull) J(c.rate, c.value) -= pull;
     };
-    // On its threshold a stop has no force, and is in the column of its gap alone.
     const auto [other, stop] = neighbour(base);
     if (other != nullptr && base[layout_.gaps[stop].value] == 0) {
       const SplitLayout::Coordinate& gap = layout_.gaps[stop];
       const int column = gap.value;
       MatrixXd J = other->L;
-      J.col(column) = problem_->linear(step_.start, base.data(), contact_, column, 1);
+      J.col(column) += (contact_[stop] ? 1 : -1) * pull_of(stop, base);
       hold(J, gap);
       try {
         return std::make_unique<LinearPart>(*other, J, column);
@@ -222,7 +221,7 @@ class ExponentialStepper final : public Stepper {
         // The block alone has no full set of eigenvectors, or two in one place; all of L may do.
       }
     }
-    MatrixXd J = problem_->linear(step_.start, base.data(), contact_, 0, nx_);
+    MatrixXd J = problem_->linear(step_.start, base.data(), contact_);
     if (const double largest = J.cwiseAbs().maxCoeff(); !(largest * largest < std::numeric_limits<double>::max()))
       throw NumericalError(fmt::format(  // no other method could, so this is no failure of the method
           "the Jacobian of the equations of motion has entries of {:.2g}, whose squares overflow", largest));
@@ -236,6 +235,19 @@ class ExponentialStepper final : public Stepper {
       for (const auto& [value, rate] : layout_.coordinates) J(rate, value) -= pull;
       return std::make_unique<LinearPart>(J, omegas, base);
     }
+  }
+
+  /// What a closed stop adds to L. On its threshold it has no force, and is in the column of its gap alone.
+  VectorXd pull_of(size_t stop, VectorXd base) {
+    constexpr double gap = 1e-6;  // small, and far from round-off
+    std::vector<char> contact = contact_;
+    const auto derivative = [&](bool closed) -> VectorXd {
+      contact[stop] = closed;
+      problem_->derivative(step_.start, base.data(), contact, y_dot_.data());
+      return y_dot_.head(nx_);
+    };
+    base[layout_.gaps[stop].value] = gap;
+    return (derivative(true) - derivative(false)) / gap;
   }
 
   /// A linear part at the same place that differs in one stop, and which.
@@ -382,11 +394,11 @@ class ExponentialStepper final : public Stepper {
     constexpr double soon[] = {0.02, 0.07};
     double error = 0;
     for (const double c : soon) {
-      step_.linear->point(c, step_.length, scratch_);
-      step_.linear->combine(scratch_, 0, step_.Z.col(0), step_.M, at_end_.col(0));
+      const GridPoint& point = point_at(c);
+      step_.linear->combine(point, 0, step_.Z.col(0), step_.M, at_end_.col(0));
       step_.linear->to_x(at_end_.leftCols<1>(), x_at_end_.leftCols<1>());
       y_.head(nx_) = x_at_end_.col(0);
-      if (layout_.attitudes_matter) follow_to(scratch_, c);
+      if (layout_.attitudes_matter) follow_to(point, c);
       force(c);
       step_.linear->remainder(y_dot_.head(nx_), at_end_.leftCols<1>(), at_end_.rightCols<1>());
       error_modes_.noalias() = at_end_.col(1) - step_.N * (collocation::coefficients() * collocation::monomials(c));
@@ -395,6 +407,13 @@ class ExponentialStepper final : public Stepper {
       error = std::max(error, norm(x_at_end_.col(1)));
     }
     return error;
+  }
+
+  /// Kept for steps of the same size, as their grid is.
+  const GridPoint& point_at(double c) {
+    if (step_.grid != &spare_) return step_.linear->kept_point(c, step_.length);
+    step_.linear->point(c, step_.length, scratch_);
+    return scratch_;
   }
 
   /// What the middle point adds to the interpolation by the others, carried to the end of the step.

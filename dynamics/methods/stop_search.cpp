@@ -29,49 +29,49 @@ double StopSearch::first_crossing(const CollocatedStep& step, std::span<const ch
 
 namespace {
 
-/// What each of m modes has of the rate of an entry of x: the real part of f (lambda z + n), where f are its
-/// eigenvectors there, with the sign of the imaginary parts turned. Parts in halves of m; `size`: its square.
+/// What each of m modes has of an entry of x, beyond where the remainder n holds it: the real part of
+/// f (lambda z + n) / lambda, where f are its eigenvectors there, with the sign of the imaginary parts turned. Parts in
+/// halves of m. `rate`: the square of the same times lambda. Of lambda = 0 the share is no number.
 FLEXBOOM_FOR_EACH_PROCESSOR
-void rates_of(Index m, const double* lambda_re, const double* lambda_im, const double* f, const double* z,
-              const double* n, double* rate, double* size) {
+void shares_of(Index m, const double* lambda_re, const double* lambda_im, const double* f, const double* z,
+               const double* n, double* share, double* rate) {
 #pragma GCC ivdep
   for (Index k = 0; k < m; ++k) {
-    const double re = lambda_re[k] * z[k] - lambda_im[k] * z[m + k] + n[k];
-    const double im = lambda_re[k] * z[m + k] + lambda_im[k] * z[k] + n[m + k];
-    rate[k] = f[k] * re + f[m + k] * im;
-    rate[m + k] = f[k] * im - f[m + k] * re;
-    size[k] = rate[k] * rate[k] + rate[m + k] * rate[m + k];
+    const double x = lambda_re[k], y = lambda_im[k], inverse = 1 / (x * x + y * y);
+    const double re = x * z[k] - y * z[m + k] + n[k], im = x * z[m + k] + y * z[k] + n[m + k];
+    const double r = f[k] * re + f[m + k] * im, i = f[k] * im - f[m + k] * re;
+    share[k] = (r * x + i * y) * inverse;
+    share[m + k] = (i * x - r * y) * inverse;
+    rate[k] = r * r + i * i;
   }
 }
 
 }  // namespace
 
-void StopSearch::take_rates(const CollocatedStep& step, int entry, int point) {
+void StopSearch::take_shares(const CollocatedStep& step, int entry, int point) {
   const LinearPart& linear = *step.linear;
   const Index m = linear.lambda.size();
-  rates_.resize(2 * m), sizes_.resize(m);
-  rates_of(m, linear.lambda_re().data(), linear.lambda_im().data(), linear.of_modes.col(entry).data(),
-           step.Z.col(point).data(), step.N.col(point).data(), rates_.data(), sizes_.data());
+  shares_.resize(2 * m), rates_.resize(m);
+  shares_of(m, linear.lambda_re().data(), linear.lambda_im().data(), linear.of_modes.col(entry).data(),
+            step.Z.col(point).data(), step.N.col(point).data(), shares_.data(), rates_.data());
 }
 
-std::complex<double> StopSearch::share_of(const CollocatedStep& step, Index mode) const {
-  return std::complex<double>(rates_[mode], rates_[sizes_.size() + mode]) / step.linear->lambda[mode];
-}
+std::complex<double> StopSearch::share_of(Index mode) const { return {shares_[mode], shares_[rates_.size() + mode]}; }
 
 StopSearch::Ripple StopSearch::ripple(const CollocatedStep& step, int gap, int point) {
-  take_rates(step, gap, point);
-  const double fastest = sizes_.maxCoeff();
+  take_shares(step, gap, point);
+  const double fastest = rates_.maxCoeff();
   double widest = 0;
   fast_.clear();
-  for (Index k = 0; k < sizes_.size(); ++k) {
-    const std::complex<double> rate = step.linear->lambda[k] * step.length;
+  for (Index k = 0; k < rates_.size(); ++k) {
+    const std::complex<double> rate = step.length * step.linear->lambda[k];
     if (std::norm(rate) < 4) continue;  // slow
-    fast_.push_back({k, rate, share_of(step, k)});
+    fast_.push_back({k, rate, share_of(k)});
     widest = std::max(widest, std::norm(fast_.back().share));
   }
   // Less than a fiftieth of the largest rate and of the widest is nothing.
   std::erase_if(fast_,
-                [&](const Fast& f) { return sizes_[f.mode] < 4e-4 * fastest && std::norm(f.share) < 4e-4 * widest; });
+                [&](const Fast& f) { return rates_[f.mode] < 4e-4 * fastest && std::norm(f.share) < 4e-4 * widest; });
   Ripple r;
   for (const Fast& f : fast_) {
     if (f.rate.imag() < 2) continue;
@@ -88,9 +88,9 @@ double StopSearch::crossing_at_places(const CollocatedStep& step, const At& at, 
   // a cubic.
   const double width = to.c - from.c;
   Clearance slow_from = from, slow_to = to;
-  take_rates(step, places.gap, places.to);
+  take_shares(step, places.gap, places.to);
   for (Fast& f : fast_) {
-    const std::complex<double> there = places.side * share_of(step, f.mode);
+    const std::complex<double> there = places.side * share_of(f.mode);
     f.share *= places.side;
     f.factor = std::exp(f.rate * width / static_cast<double>(places.parts));
     slow_from.value -= f.share.real(), slow_from.slope -= (f.rate * f.share).real();

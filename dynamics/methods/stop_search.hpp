@@ -46,10 +46,9 @@ class StopSearch {
     double amplitude = 0;  // together
   };
 
-  /// Sets `rates_`: what each mode has of the rate of an entry of x at a point.
-  void take_rates(const CollocatedStep&, int entry, int point);
-  /// Of that entry, beyond where the remainder holds it.
-  std::complex<double> share_of(const CollocatedStep&, Eigen::Index mode) const;
+  /// Sets `shares_` and `rates_`: what each mode has of an entry of x at a point, and of its rate.
+  void take_shares(const CollocatedStep&, int entry, int point);
+  std::complex<double> share_of(Eigen::Index mode) const;
 
   /// Of a gap (an entry of x) from a point of the step on; sets `fast_`.
   Ripple ripple(const CollocatedStep&, int gap, int point);
@@ -69,7 +68,7 @@ class StopSearch {
   std::vector<SplitLayout::Coordinate> gaps_;  // of each stop
   std::vector<std::pair<int, double>> roots_;
   std::vector<Fast> fast_;
-  Eigen::VectorXd z_, rates_, sizes_;  // rates: real parts, then imaginary parts; sizes: their squares
+  Eigen::VectorXd z_, shares_, rates_;  // shares: real parts, then imaginary parts; rates: squares
   GridPoint scratch_;
 };
 

@@ -10,7 +10,7 @@ namespace flexboom {
 /// Hinge between a hub and a boom. At angle Theta the boom's x axis is cos(Theta) stowed + sin(Theta) outward, its y
 /// axis the derivative of that (positive deflection), its z axis the hinge axis; the boom's BRF origin is at `point`.
 struct Hinge {
-  std::string name;                                    // empty: that of the boom
+  std::string name{};                                  // empty: that of the boom
   Eigen::Vector3d point = Eigen::Vector3d::Zero();     // on the hub, hub BRF [m]
   Eigen::Vector3d stowed = Eigen::Vector3d::UnitY();   // unit, hub axes
   Eigen::Vector3d outward = Eigen::Vector3d::UnitX();  // unit, normal to stowed

@@ -98,6 +98,12 @@ const Grid& LinearPart::kept_grid(double h) {
   return place->second;
 }
 
+const GridPoint& LinearPart::kept_point(double c, double h) {
+  const auto [place, is_new] = points_.try_emplace({c, h});
+  if (is_new) point(c, h, place->second);
+  return place->second;
+}
+
 void LinearPart::combine(const GridPoint& b, int shift, const Eigen::Ref<const VectorXd>& z0, const MatrixXd& M,
                          Eigen::Ref<VectorXd> z) const {
   sum_of_products(lambda.size(), b.col(shift).data(), z0.data(), M.data(), z.data());

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <map>
+#include <utility>
 #include <vector>
 
 namespace flexboom {
@@ -50,6 +51,7 @@ struct LinearPart : Spectrum {
   void point(double c, double h, GridPoint&) const;
   void grid(double h, Grid&) const;
   const Grid& kept_grid(double h);  // kept for the next step of the same size
+  const GridPoint& kept_point(double c, double h);
 
   /// z at a point (shift 0), or its integral from the start over h (shift 1). M: the remainder's
   /// coefficients of c^m, times h m!.
@@ -72,6 +74,7 @@ struct LinearPart : Spectrum {
   Eigen::VectorXd lambda_re_, lambda_im_;
   Eigen::Index used_;  // of z: the rest is always zero
   std::map<double, Grid> grids_;
+  std::map<std::pair<double, double>, GridPoint> points_;
 };
 
 }  // namespace flexboom

@@ -60,8 +60,8 @@ class SplitProblem {
   virtual void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) = 0;
   /// The acceleration of a root's mass centre, at the state of the last `derivative` [m/s^2].
   virtual Eigen::Vector3d outside_acceleration(size_t root, double t, const double* y) = 0;
-  /// Columns of d(x')/dx.
-  virtual Eigen::MatrixXd linear(double t, const double* y, std::span<const char> contact, int first, int count) = 0;
+  /// d(x')/dx.
+  virtual Eigen::MatrixXd linear(double t, const double* y, std::span<const char> contact) = 0;
   /// By x and attitudes alone. t: of prescribed motions [s].
   virtual FloatingBodies floating(size_t root, double t, const double* y) = 0;
   /// The same mass centre, at a part of the cost.

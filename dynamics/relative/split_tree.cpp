@@ -98,10 +98,10 @@ class SplitTree final : public SplitProblem {
     return to_root(root) * (tree_.scene().gravity + force / m);
   }
 
-  MatrixXd linear(double t, const double* y, std::span<const char> contact, int first, int count) override {
-    MatrixXd columns(layout_.x, count);
-    tree_.jacobian_columns(t, y, of_joints(contact), *work_, first, columns);
-    return columns;
+  MatrixXd linear(double t, const double* y, std::span<const char> contact) override {
+    MatrixXd L(layout_.x, layout_.x);
+    tree_.jacobian_columns(t, y, of_joints(contact), *work_, L);
+    return L;
   }
 
   FloatingBodies floating(size_t root, double t, const double* y) override {

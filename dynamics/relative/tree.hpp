@@ -132,8 +132,8 @@ class Tree {
   void jacobian(double t, const double* y, std::span<const char> contact, TreeWorkspace&, Eigen::MatrixXd& J,
                 std::span<const LawBranch> laws = {}) const;
 
-  /// Columns of it, from `first` on: as many as `columns` has, and as many rows of them.
-  void jacobian_columns(double t, const double* y, std::span<const char> contact, TreeWorkspace&, int first,
+  /// Its first columns: as many as `columns` has, and as many rows of them.
+  void jacobian_columns(double t, const double* y, std::span<const char> contact, TreeWorkspace&,
                         Eigen::Ref<Eigen::MatrixXd> columns, std::span<const LawBranch> laws = {}) const;
 
   /// Joints with a stop, and where they are: coordinate less threshold, its rate.

@@ -86,8 +86,8 @@ class UnfitSplit final : public SplitProblem {
   Vector3d outside_acceleration(size_t root, double t, const double* y) override {
     return problem_->outside_acceleration(root, t, y);
   }
-  Eigen::MatrixXd linear(double t, const double* y, std::span<const char> contact, int first, int count) override {
-    return problem_->linear(t, y, contact, first, count);
+  Eigen::MatrixXd linear(double t, const double* y, std::span<const char> contact) override {
+    return problem_->linear(t, y, contact);
   }
   FloatingBodies floating(size_t root, double t, const double* y) override { return problem_->floating(root, t, y); }
   MassCentre mass_centre(size_t root, double t, const double* y) override { return problem_->mass_centre(root, t, y); }

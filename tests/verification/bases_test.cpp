@@ -159,7 +159,7 @@ TEST_P(SlowBases, FlyAlikeInEveryPlace) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Structures, SlowBases, ::testing::Values("beam", "solid"),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& instance) { return std::string(instance.param); });
 
 }  // namespace
 }  // namespace flexboom
