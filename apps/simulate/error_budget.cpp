@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -276,14 +277,15 @@ OutputFloors floors_of(const Scene& scene, const std::vector<PreparedBody>& bodi
   return floors;
 }
 
-std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors& floors, int digits,
+std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors& floors, TimeError asked,
                                                 const RunHooks& hooks, std::vector<std::string>& plan) {
-  for (;; --digits) {
+  for (double before = std::numeric_limits<double>::infinity();;) {
     const Scene tight = with_a_digit_more(flown);
     Run finer = run_once(tight, hooks, 0, bearable_steps(run));
     std::vector<OutputDifference> differences = compare_outputs(run.outputs, finer.outputs, flown.outputs, floors);
     const double error = largest(differences);
-    if (error <= flown.tolerance / 3 || digits == 0 || hooks.stopped() || tight.step_tolerance() < least_tolerance)
+    if (!(error < std::exchange(before, error) / 5)) --asked.digits;
+    if (error <= asked.bearable || asked.digits <= 0 || hooks.stopped() || tight.step_tolerance() < least_tolerance)
       return differences;
     plan.push_back(fmt::format(
         "time integration: changed by {:.1e} at a tenth of the tolerance {:.0e}; the integrator gets {:.0e}", error,
@@ -291,6 +293,29 @@ std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const Ou
     run = std::move(finer);
     flown = tight;
   }
+}
+
+std::string settle_pointing(Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
+  if (scene.turns.empty()) return "";
+  const std::string pointing = scene.turns.front().body + ".pointing";
+  Scene flown = as_flown(scene, run);
+  std::erase_if(flown.outputs, [&](const std::string& text) { return wanted_output(text).name != pointing; });
+  if (scene.outputs.empty()) flown.outputs = {pointing};
+  if (flown.outputs.empty()) return "";
+  constexpr double promised = 10;
+  const bool is_cheap = run.motion.summary.method == "exponential";
+  const TimeError asked{promised * scene.tolerance / 3, is_cheap ? 2 : 0};
+  std::string warning;
+  try {
+    const double error = largest(settle_time_error(flown, run, floors_of(scene, run.bodies), asked, hooks, plan));
+    if (error > asked.bearable)
+      warning = fmt::format("{} is off by {:.1e} or more, by a repeat with a digit more: a smaller tolerance helps",
+                            pointing, error);
+  } catch (const std::runtime_error& e) {  // the run that is repeated outlives a failure
+    warning = fmt::format("{} may be off by more than ten times the tolerance: {}", pointing, e.what());
+  }
+  scene.integrator_tolerance = flown.integrator_tolerance;
+  return warning;
 }
 
 ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan,
@@ -314,8 +339,8 @@ ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::v
   };
   budget.linearisation = measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
   budget.time = measured("time", [&] {
-    constexpr int digits = 2;
-    return m.enter(&OutputErrors::time, {settle_time_error(flown, run, m.repeats.floors, digits, hooks, m.plan)});
+    const TimeError asked{scene.tolerance / 3, 2};  // a third: there are other errors
+    return m.enter(&OutputErrors::time, {settle_time_error(flown, run, m.repeats.floors, asked, hooks, m.plan)});
   });
   scene.integrator_tolerance = flown.integrator_tolerance;
   budget.truncation = measured("truncation", [&] {

@@ -11,11 +11,22 @@ namespace flexboom {
 /// Steps that a flight in comparison with another may take; beyond, it costs too much.
 long bearable_steps(const Run&);
 
-/// Repeats a run ten times tighter until its outputs change by no more than a third of the accuracy wanted, for there
-/// are other errors: so many digits more at most. `run` is then the last but one, `flown` has the tolerance of its
-/// integrator, and `plan` says so. Returns the last differences. @throws InputError, NumericalError as run_scene.
-std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors&, int digits,
-                                                const RunHooks&, std::vector<std::string>& plan);
+/// What settle_time_error is content with.
+struct TimeError {
+  double bearable;  // the largest difference of the outputs
+  int digits;       // more of the integrator, at most; those that take four fifths of the difference away do not count
+};
+
+/// Repeats a run ten times tighter until its outputs change no more than is bearable. `run` is then the last but one,
+/// `flown` has the tolerance of its integrator, and `plan` says so. Returns the last differences.
+/// @throws InputError, NumericalError as run_scene.
+std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors&, TimeError, const RunHooks&,
+                                                std::vector<std::string>& plan);
+
+/// Without a budget an output keeps the tolerance within a factor of ten. An attitude against the commanded one does
+/// not by itself: it is a small difference of large angles, and steps know the angles alone. Settles its error where
+/// digits are cheap, and measures it by others. Returns what is to be warned about; empty: nothing.
+std::string settle_pointing(Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan);
 
 /// Repeats a run with a tighter integrator, more modes in and out of the hinge plane, and a finer mesh, and compares
 /// the outputs wanted. Where the integrator has to be tighter, that run takes the place of `run`, and the scene gets

@@ -153,9 +153,9 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
   Scene with_few = with_candidates(scene, fewest, candidates_, hooks);
   Run few = run_once(with_few, hooks);
   if (!std::exchange(is_timed_, true)) {
-    constexpr int digits = 6;
+    const TimeError asked{scene.tolerance / 3, 6};
     try {
-      settle_time_error(with_few, few, floors_of(scene, few.bodies), digits, hooks, plan);
+      settle_time_error(with_few, few, floors_of(scene, few.bodies), asked, hooks, plan);
     } catch (const NumericalError& e) {  // no more digits can be had: those that were reached count
       plan.push_back(fmt::format("time integration: no tighter than {:.0e}: {}", with_few.step_tolerance(), e.what()));
     }

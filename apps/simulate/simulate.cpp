@@ -244,6 +244,7 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
     };
   Run run = run_once(r.scene, of_run);
   std::vector<std::string> words;  // of the budget
+  std::string warning;
   // The repeats cost many times the run; a long one is not repeated.
   constexpr long worth_repeating = 2'000'000;
   const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating;
@@ -259,9 +260,12 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
       r.budget = measure_budget(r.scene, run, hooks, words, planner.still());
     }
     r.budget_seconds = start.seconds();
+  } else if (repeat && !run.motion.summary.interrupted) {
+    warning = settle_pointing(r.scene, run, hooks, words);
   }
   add_words(run, r);
   r.plan.insert(r.plan.end(), words.begin(), words.end());
+  if (!warning.empty()) r.warnings.push_back(warning);
   add_warnings(run, r);
   take(std::move(run), r);
   if (r.scene.verify && !r.trajectory.summary.interrupted) r.checks = reference_checks(r, hooks);

@@ -23,13 +23,29 @@ SweepRunner::SweepRunner(SceneSource source, SweepValues values, bool loads, boo
       keep_trajectories_(keep_trajectories),
       scene_(source_.read()) {
   std::vector<std::string> plan;
+  const double given = scene_.integrator_tolerance;
   Planner(scene_).choose(scene_, {}, plan);
   set_options(scene_);
   scene_.bodies_kept_in = source_.bodies_kept_in();
   validate(scene_);
   for (const BodyScene& b : with_joints(scene_).bodies)
     if (b.is_boom()) bodies_.get(b, 0, scene_.bodies_kept_in);
+  settle();
+  if (scene_.integrator_tolerance != given) share_of_tolerance_ = scene_.step_tolerance() / scene_.tolerance;
   note_columns(scene_);
+}
+
+/// How much tighter than its accuracy the scene as it stands must be flown: so are all runs.
+void SweepRunner::settle() {
+  if (scene_.turns.empty()) return;
+  RunHooks hooks;
+  hooks.bodies = &bodies_;
+  std::vector<std::string> plan;
+  try {
+    Run run = run_once(scene_, hooks);
+    settle_pointing(scene_, run, hooks, plan);
+  } catch (const std::exception&) {  // is reported as a run, where it is one
+  }
 }
 
 void SweepRunner::look_for_columns(size_t runs) {
@@ -55,6 +71,8 @@ void SweepRunner::set_options(Scene& scene) const {
       b.modes = scene_.bodies[i].modes, b.shapes = scene_.bodies[i].shapes;
       b.open_directions();
     }
+  if (const double tolerance = share_of_tolerance_ * scene.tolerance; tolerance < scene.step_tolerance())
+    scene.integrator_tolerance = tolerance;
   if (loads_) ask_for_loads(scene);
 }
 

@@ -46,6 +46,7 @@ class SweepRunner {
 
  private:
   Scene scene_of_run(size_t run) const;
+  void settle();
   void set_options(Scene&) const;
   Run simulate(const Scene&);
   void note_columns(Scene);
@@ -54,6 +55,7 @@ class SweepRunner {
   SweepValues values_;
   bool loads_, keep_trajectories_;
   Scene scene_;
+  double share_of_tolerance_ = 1;  // that the integrator of every run gets at most
   std::vector<Quantity> quantities_;
   std::vector<std::string> columns_;
   PreparedBodies bodies_;

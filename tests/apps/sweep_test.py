@@ -379,6 +379,19 @@ class Results(Case):
             self.assertNotIn("nan", drawing)
         self.assertIn("Sobol indices", page)
 
+    def test_pointing_is_that_of_a_run_with_many_digits(self):
+        """Steps at the tolerance alone make a pointing error that is a hundred times the true one."""
+        duration = 160
+        self.assert_exit(OK, flexboom("sweep", "sport-calibration", "--vary", "accuracy.tolerance=1e-3", "--vary",
+                                      f"duration={duration}", "--quantity", "sport.pointing:max", "--out",
+                                      self.folder / "o"))
+        out = self.folder / "run"
+        self.assert_exit(OK, flexboom("run", "sport-calibration", "--no-budget", "--quiet", "--tolerance", "1e-8",
+                                      "--duration", str(duration), "--out", out))
+        columns = cli.columns(out / "trajectory.csv")
+        exact = max(np.linalg.norm([columns[f"sport.pointing.{axis}"] for axis in "xyz"], axis=0))
+        self.assertLess(abs(self.numbers(self.folder / "o", "sport.pointing:max")[0] / exact - 1), 1e-2)
+
     def test_json_is_the_summary(self):
         result = flexboom("sweep", "sport", *SHORT, "--vary", "hub.mass=8", "--loads", "--json", "--out", self.folder / "o")
         self.assert_exit(OK, result)

@@ -92,6 +92,21 @@ TEST(Calibration, ShakesMoreByCornersThanSmoothly) {
   EXPECT_LT(corners.trajectory.summary.momentum_drift, 1e-6);
 }
 
+/// Steps know the attitude alone, which is a thousand times larger.
+TEST(Calibration, PointingHasItsOwnDigitsWithoutABudget) {
+  Scene scene = quarter_turn("smooth", false);
+  scene.error_budget = false;
+  scene.tolerance = 1e-9;
+  const RunResult exact = run_scene(scene, {});
+  for (const double tolerance : {1e-2, 1e-3, 1e-4}) {
+    scene.tolerance = tolerance;
+    const RunResult r = run_scene(scene, {});
+    const double error = compare_outputs(r.outputs, exact.outputs, {"sport.pointing"}).at(0).error;
+    std::printf("calibration: pointing %.1e off at %.0e, steps at %.0e\n", error, tolerance, r.scene.step_tolerance());
+    EXPECT_LT(error, 10 * tolerance);
+  }
+}
+
 /// Booms that came to rest on their stops are pushed into them by the next turn, at any time within a step.
 TEST(Calibration, TheNextTurnFindsTheStopsOfBoomsAtRest) {
   Scene scene = quarter_turn("trapezoid", false);
