@@ -70,7 +70,7 @@ struct BodyPlaces {
 struct JointMemory {
   std::vector<char> closed;
   std::vector<double> near;
-  std::vector<LawBranch> laws;  // empty: no joint has one
+  std::vector<LawBranch> laws{};  // empty: no joint has one
 
   MechanismState of(size_t joint) const {
     return {closed[joint] != 0, near[joint], laws.empty() ? LawBranch{} : laws[joint]};

@@ -28,7 +28,7 @@ struct SolidOptions {
   double accuracy = 1e-4;       // wanted relative error of the first ten frequencies; chooses what is left open
   int order = 0;                // of "hex": 1 to 8, 0: chosen
   double slit = 0;              // width of a slit along every tube, at +y, measured on the midline [m]; 0: closed
-  SolidGrading grading;
+  SolidGrading grading{};
 };
 
 /// Order and sizes that make_solid_mesh takes, nothing left open.

@@ -26,8 +26,9 @@ enum class SturmPolicy { when_cheap, always, never };
 
 struct EigenOptions {
   int num_modes = 10;
-  std::optional<double> sigma;  // shift [rad^2/s^2]; chosen by the program when absent: 0 if clamped, negative if free
-  double tolerance = 0;         // relative residual asked of the backend; 0 is the backend's own choice, see README
+  std::optional<double>
+      sigma{};           // shift [rad^2/s^2]; chosen by the program when absent: 0 if clamped, negative if free
+  double tolerance = 0;  // relative residual asked of the backend; 0 is the backend's own choice, see README
   std::string backend = "arpack";  // a row of eigen_backends(), or "auto"
   SturmPolicy sturm = SturmPolicy::when_cheap;
   bool whole_groups = false;  // return more modes than asked where a group of equal frequencies would be cut

@@ -25,7 +25,7 @@ constexpr double digits = 1e-9;
 
 class Law : public ::testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(EveryMethod, Law, ::testing::ValuesIn(testing::every_method),
-                         [](const auto& info) { return info.param; });
+                         [](const auto& instance) { return instance.param; });
 
 constexpr double J = 2, k = 8, omega = 2;  // of the oscillator [kg m^2], [N m/rad], [rad/s]
 HingeMechanism spring(double stiffness = k, double damping = 0) { return {stiffness, 0, damping, 0, 0}; }
@@ -157,7 +157,9 @@ TEST_P(Law, LatchLocksAtTheFirstSlowPassAndNothingMovesAfter) {
   EXPECT_NEAR(f.events.at(0).rate, rate(latched), digits);
   for (size_t i = 0; i < f.time.size(); ++i) {
     EXPECT_NEAR(f.coordinate[i][0], f.time[i] < latched ? x(f.time[i]) : 0.3, digits);
-    if (f.time[i] > latched) EXPECT_NEAR(f.rate[i][0], 0, 1e-12);
+    if (f.time[i] > latched) {
+      EXPECT_NEAR(f.rate[i][0], 0, 1e-12);
+    }
   }
   EXPECT_NEAR(f.ledger.back().laws[static_cast<size_t>(LawLoss::latch)], J / 2 * rate(latched) * rate(latched), digits);
   expect_balanced(f);

@@ -262,7 +262,8 @@ TEST(Multipliers, FarAndFastIsTheSameMotion) {
     std::vector<BodyState> start = sport.start();
     for (BodyState& b : start) b.position += distance * way, b.velocity += speed * way.reverse();
     const MultibodyTrajectory there = integrate_multipliers(system, start, o);
-    EXPECT_LT(there.summary.steps, 1.2 * here.summary.steps) << distance << " m, " << speed << " m/s";
+    EXPECT_LT(there.summary.steps, 1.2 * static_cast<double>(here.summary.steps))
+        << distance << " m, " << speed << " m/s";
     EXPECT_EQ(there.events.size(), here.events.size());
     const double far = distance + speed * o.duration, round_off = 1e-15 * far;
     ASSERT_EQ(there.time, here.time);
@@ -272,7 +273,9 @@ TEST(Multipliers, FarAndFastIsTheSameMotion) {
       for (size_t k = 0; k < a.bodies.size(); ++k) {
         EXPECT_LT((b.bodies[k].position - moved - a.bodies[k].position).norm(), 1e-9 + round_off);
         EXPECT_LT((b.bodies[k].velocity - speed * way.reverse() - a.bodies[k].velocity).norm(), 1e-7);
-        if (k > 0) EXPECT_LT((b.bodies[k].q - a.bodies[k].q).norm(), 1e-9 + 10 * round_off);
+        if (k > 0) {
+          EXPECT_LT((b.bodies[k].q - a.bodies[k].q).norm(), 1e-9 + 10 * round_off);
+        }
       }
       for (size_t k = 0; k < a.coordinate.size(); ++k) EXPECT_NEAR(b.coordinate[k], a.coordinate[k], 1e-8);
     }

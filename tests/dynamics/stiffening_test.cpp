@@ -302,9 +302,9 @@ TEST(Stiffening, IsThatOfTheMotionAndTheLoads) {
     K += M[static_cast<int>(i)] * b.Kg.markers[0].torque[i];
   }
   const SecondOrderShapes shapes = with_second_order_shapes(b);
-  for (size_t a = 0; a < shapes.follow.size(); ++a) {
-    const VectorXd E = shapes.body.Me.row(3 + static_cast<Index>(a)).head<3>();  // int rho S . (shape a)
-    K += E.dot(q_ddot) * shapes.follow[a] + E * (shapes.follow[a] * q_ddot).transpose();
+  for (size_t k = 0; k < shapes.follow.size(); ++k) {
+    const VectorXd E = shapes.body.Me.row(3 + static_cast<Index>(k)).head<3>();  // int rho S . (shape k)
+    K += E.dot(q_ddot) * shapes.follow[k] + E * (shapes.follow[k] * q_ddot).transpose();
   }
   const MatrixXd found = -b.Me * (slope[1] - slope[0]);
   EXPECT_LT((found - K).norm(), 1e-12 * K.norm());  // round-off

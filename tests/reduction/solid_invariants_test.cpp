@@ -137,8 +137,9 @@ TEST(SlowSolidInvariants, ConvergeAtASingularRimAsItsExponentSays) {
     const auto change = errors(last, next);
     print("one level more", change);
     for (const char* name : {"Ct", "Cr0", "J1", "J2", "Ke"}) {
-      if (!before.empty())
+      if (!before.empty()) {
         EXPECT_NEAR(before[name] / change.at(name) / std::pow(0.2, -2 * rim_exponent(nu)), 1, 0.05) << name;
+      }
     }
     before = change;
     last = next;
