@@ -104,7 +104,14 @@ std::vector<std::string> outputs_of(const Scene& scene) {
   }
   for (const WheelScene& wheel : scene.wheels) names.push_back(wheel.name + ".spin");
   if (!scene.turns.empty()) names.push_back(scene.turns.front().body + ".pointing");
+  if (scene.orbit && first_that_flies(scene) < scene.joints.size())
+    for (const char* angle : {"lvlh.roll", "lvlh.pitch", "lvlh.yaw"}) names.emplace_back(angle);
   return names;
+}
+
+size_t first_that_flies(const Scene& scene) {
+  const auto flies = [](const JointScene& j) { return j.kind == JointKind::free && j.a.body.empty(); };
+  return static_cast<size_t>(std::ranges::find_if(scene.joints, flies) - scene.joints.begin());
 }
 
 }  // namespace flexboom

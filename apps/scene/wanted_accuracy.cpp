@@ -48,9 +48,10 @@ WantedOutput wanted_output(const std::string& text) {
 
 std::string_view unit_of(const std::string& output) {
   static const std::map<std::string, std::string_view> units = {
-      {"angle", "rad"},  {"angle1", "rad"},  {"angle2", "rad"},   {"rotation", "rad"}, {"pointing", "rad"},
-      {"rate", "rad/s"}, {"rate1", "rad/s"}, {"rate2", "rad/s"},  {"spin", "rad/s"},   {"length", "m"},
-      {"position", "m"}, {"tip", "m"},       {"velocity", "m/s"}, {"force", "N"},      {"torque", "N m"}};
+      {"angle", "rad"},    {"angle1", "rad"}, {"angle2", "rad"}, {"rotation", "rad"}, {"pointing", "rad"},
+      {"roll", "rad"},     {"pitch", "rad"},  {"yaw", "rad"},    {"rate", "rad/s"},   {"rate1", "rad/s"},
+      {"rate2", "rad/s"},  {"spin", "rad/s"}, {"length", "m"},   {"position", "m"},   {"tip", "m"},
+      {"velocity", "m/s"}, {"force", "N"},    {"torque", "N m"}};
   const auto found = units.find(output.substr(output.rfind('.') + 1));
   return found == units.end() ? "" : found->second;
 }

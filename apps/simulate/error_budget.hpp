@@ -23,9 +23,12 @@ struct TimeError {
 std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors&, TimeError, const RunHooks&,
                                                 std::vector<std::string>& plan);
 
-/// Without a budget an output keeps the tolerance within a factor of ten. An attitude against the commanded one does
-/// not by itself: it is a small difference of large angles, and steps know the angles alone. Settles its error where
-/// digits are cheap, and measures it by others. Returns what is to be warned about; empty: nothing.
+/// Those wanted that are a pointing (is_pointing), as they are wanted.
+std::vector<std::string> wanted_pointings(const Scene&);
+
+/// Without a budget an output keeps the tolerance within a factor of ten. A pointing does not by itself: it is a small
+/// difference of large angles, and steps know the angles alone. Settles its error where digits are cheap, and measures
+/// it by others. Returns what is to be warned about; empty: nothing.
 std::string settle_pointing(Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan);
 
 /// Repeats a run with a tighter integrator, more modes in and out of the hinge plane, and a finer mesh, and compares

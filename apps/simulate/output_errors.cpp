@@ -10,6 +10,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -37,10 +38,13 @@ std::string output_of_column(const std::string& column) {
   return column;
 }
 
+/// Is it an angle of the attitude against the orbit's frame?
+bool is_of_lvlh(const std::string& output) { return output.starts_with("lvlh."); }
+
 /// How it is wanted, if it is.
 std::optional<WantedOutput> wanted_as(const std::string& output, const std::vector<WantedOutput>& wanted) {
-  if (output == "t" || output.starts_with("energy.") || output.starts_with("lvlh.")) return {};
-  if (wanted.empty()) return WantedOutput{output};
+  if (output == "t" || output.starts_with("energy.")) return {};
+  if (wanted.empty()) return is_of_lvlh(output) ? std::nullopt : std::optional(WantedOutput{output});
   const auto found = std::ranges::find(wanted, output, &WantedOutput::name);
   return found == wanted.end() ? std::nullopt : std::optional(*found);
 }
@@ -49,6 +53,13 @@ std::optional<WantedOutput> wanted_as(const std::string& output, const std::vect
 /// pi.
 double angle_between(const Vector3d& a, const Vector3d& b) {
   return rotation_vector(quaternion_product(quaternion_of(-a), quaternion_of(b))).norm();
+}
+
+/// Of two values of an output.
+double distance_of(const std::string& output, const VectorXd& a, const VectorXd& b) {
+  if (output.ends_with(".rotation")) return angle_between(a, b);
+  if (is_of_lvlh(output)) return std::abs(std::remainder(a[0] - b[0], 2 * std::numbers::pi));
+  return (a - b).norm();
 }
 
 using ColumnPlaces = std::vector<Index>;
@@ -93,6 +104,8 @@ double bearable(const std::string& output, const OutputFloors& floors, const std
 
 bool is_coordinate(const std::string& column) { return output_of_column(column).ends_with(".q"); }
 
+bool is_pointing(const std::string& output) { return output.ends_with(".pointing") || is_of_lvlh(output); }
+
 bool is_load(const std::string& output) {
   return output.ends_with(".force") || output.ends_with(".torque") || output.ends_with(".drive");
 }
@@ -124,7 +137,7 @@ std::vector<OutputDifference> compare_outputs(const OutputTable& a, const Output
     double difference = 0;
     for (Index row = 0; row < rows; ++row) {
       const VectorXd u = values_at(a, row, of_a), v = values_at(b, row, of_b);
-      const double here = output.ends_with(".rotation") ? angle_between(u, v) : (u - v).norm();
+      const double here = distance_of(output, u, v);
       d.size = std::max(d.size, v.norm());
       if (here > difference) difference = here, d.time = time < 0 ? 0 : a.values(row, time);
     }

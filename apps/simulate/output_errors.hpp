@@ -24,6 +24,9 @@ bool is_coordinate(const std::string& column);
 /// Is an output the force, the torque or the drive of a joint?
 bool is_load(const std::string& output);
 
+/// Is an output an attitude against a commanded one, or against the orbit's frame?
+bool is_pointing(const std::string& output);
+
 /// What makes of an output that hardly moves no more than it is: the errors that its scale must bear.
 struct OutputFloors {
   double tolerance = 1;                   // what relative errors are held against
@@ -39,11 +42,11 @@ struct OutputDifference {
   double size = 0;   // the largest value of the output over time [its unit]
 };
 
-/// Over the outputs that both tables have and that are wanted (all when `wanted` is empty): max over time of |a - b|,
-/// by the largest |b| over time. With floors that is no less than what tolerance makes of an absolute error and of
-/// round-off: 1e-14 of a radian, of the scene's length, of that times the largest rate or force, or of the largest
-/// output of the same unit. An output with an accuracy of its own (as wanted_output) is scaled so that its error is
-/// `tolerance` where it has that accuracy.
+/// Over the outputs that both tables have and that are wanted (all but lvlh when `wanted` is empty): max over time of
+/// |a - b|, by the largest |b| over time. With floors that is no less than what tolerance makes of an absolute error
+/// and of round-off: 1e-14 of a radian, of the scene's length, of that times the largest rate or force, or of the
+/// largest output of the same unit. An output with an accuracy of its own (as wanted_output) is scaled so that its
+/// error is `tolerance` where it has that accuracy.
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted, const OutputFloors& = {});
 

@@ -95,12 +95,6 @@ void put_load(Columns& out, const JointScene& joint, const JointLoad& load) {
     out.put_numbered(joint.name, ".drive", Eigen::Map<const VectorXd>(load.drive.data(), std::ssize(load.drive)));
 }
 
-/// The joint of the body whose attitude against the LVLH frame is an output.
-size_t first_that_flies(const Scene& scene) {
-  const auto flies = [](const JointScene& j) { return j.kind == JointKind::free && j.a.body.empty(); };
-  return static_cast<size_t>(std::ranges::find_if(scene.joints, flies) - scene.joints.begin());
-}
-
 /// Of the body on a free joint, BRF -> inertial.
 Eigen::Vector4d attitude_of(const JointScene& joint, const JointState& s) {
   const Eigen::Quaterniond turn(

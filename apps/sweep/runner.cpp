@@ -37,7 +37,7 @@ SweepRunner::SweepRunner(SceneSource source, SweepValues values, bool loads, boo
 
 /// How much tighter than its accuracy the scene as it stands must be flown: so are all runs.
 void SweepRunner::settle() {
-  if (scene_.turns.empty()) return;
+  if (wanted_pointings(scene_).empty()) return;
   RunHooks hooks;
   hooks.bodies = &bodies_;
   std::vector<std::string> plan;

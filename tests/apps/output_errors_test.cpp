@@ -46,6 +46,13 @@ TEST(OutputErrors, AVectorIsOneOutputAndItsWorstTimeIsNamed) {
   EXPECT_EQ(d.time, 0);
 }
 
+TEST(OutputErrors, AnglesAgainstTheOrbitCountWhereTheyAreNamedAndTurnOnPastHalfATurn) {
+  const std::vector<std::string> lvlh = {"t", "lvlh.yaw"};
+  const OutputTable a = table(lvlh, {0, 3.14}, {1, 3.1415}), b = table(lvlh, {0, 3.14}, {1, -3.1415});
+  EXPECT_TRUE(compare_outputs(a, b, {}).empty());
+  EXPECT_NEAR(only(compare_outputs(a, b, {"lvlh.yaw"})).error, 2 * (std::numbers::pi - 3.1415) / 3.1415, 1e-12);
+}
+
 TEST(OutputErrors, WhatNoSymmetryMovesHasTheRoundOffOfTheScene) {
   const OutputTable a = table(boom, {0, 0, 5e-15, 0}, {1, 0, -4e-15, 0}),
                     b = table(boom, {0, 0, 0, 0}, {1, 0, 1e-15, 0});
@@ -111,6 +118,7 @@ TEST(OutputErrors, EveryUnitIsThatOfAnOutput) {
   EXPECT_EQ(unit_of("boom.tip"), "m");
   EXPECT_EQ(unit_of("slide.length"), "m");
   EXPECT_EQ(unit_of("wheel.spin"), "rad/s");
+  EXPECT_EQ(unit_of("lvlh.roll"), "rad");
   EXPECT_EQ(unit_of("boom.q"), "");
   EXPECT_EQ(unit_of("hinge.drive"), "");
 }
