@@ -124,6 +124,15 @@ bool never_flew(const std::filesystem::path& folder) {
   return document["status"] == "running" || document["status"] == "failed";
 }
 
+/// The integrator is as much tighter than the accuracy as that of the run in a folder was.
+void take_digits(Scene& scene, const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "scene.toml";
+  if (!std::filesystem::exists(file)) return;
+  const Scene flown = load_scene(file.string());
+  const double tolerance = flown.step_tolerance() / flown.tolerance * scene.tolerance;
+  if (tolerance < scene.step_tolerance()) scene.integrator_tolerance = tolerance;
+}
+
 /// The scene begins with a saved state, whose modes and static shapes replace those of the scene unless they are asked
 /// for.
 void go_on(Scene& scene, const RunArguments& a) {
@@ -146,6 +155,7 @@ void go_on(Scene& scene, const RunArguments& a) {
     if (const auto statics = saved->corrections().find(b.name); statics != saved->corrections().end())
       b.basis.corrections = statics->second;
   }
+  take_digits(scene, from);
   scene.from = std::move(saved);
 }
 

@@ -278,7 +278,7 @@ OutputFloors floors_of(const Scene& scene, const std::vector<PreparedBody>& bodi
   return floors;
 }
 
-std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors& floors, TimeError asked,
+std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors& floors, Settling asked,
                                                 const RunHooks& hooks, std::vector<std::string>& plan) {
   for (double before = std::numeric_limits<double>::infinity();;) {
     const Scene tight = with_a_digit_more(flown);
@@ -310,7 +310,7 @@ std::string settle_pointing(Scene& scene, Run& run, const RunHooks& hooks, std::
   constexpr double promised = 10;
   constexpr std::string_view of_high_order[] = {"exponential", "adams", "erk"};
   const bool is_cheap = std::ranges::find(of_high_order, run.motion.summary.method) != std::end(of_high_order);
-  const TimeError asked{promised * scene.tolerance / 3, is_cheap ? 2 : 0};
+  const Settling asked{promised * scene.tolerance / 3, is_cheap ? 2 : 0};
   std::string warning;
   try {
     for (const OutputDifference& d : settle_time_error(flown, run, floors_of(scene, run.bodies), asked, hooks, plan))
@@ -346,7 +346,7 @@ ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::v
   };
   budget.linearisation = measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
   budget.time = measured("time", [&] {
-    const TimeError asked{scene.tolerance / 3, 2};  // a third: there are other errors
+    const Settling asked{scene.tolerance / 3, 2};  // a third: there are other errors
     return m.enter(&OutputErrors::time, {settle_time_error(flown, run, m.repeats.floors, asked, hooks, m.plan)});
   });
   scene.integrator_tolerance = flown.integrator_tolerance;

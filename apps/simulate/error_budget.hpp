@@ -12,7 +12,7 @@ namespace flexboom {
 long bearable_steps(const Run&);
 
 /// What settle_time_error is content with.
-struct TimeError {
+struct Settling {
   double bearable;  // the largest difference of the outputs
   int digits;       // more of the integrator, at most; those that take four fifths of the difference away do not count
 };
@@ -20,7 +20,7 @@ struct TimeError {
 /// Repeats a run ten times tighter until its outputs change no more than is bearable. `run` is then the last but one,
 /// `flown` has the tolerance of its integrator, and `plan` says so. Returns the last differences.
 /// @throws InputError, NumericalError as run_scene.
-std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors&, TimeError, const RunHooks&,
+std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors&, Settling, const RunHooks&,
                                                 std::vector<std::string>& plan);
 
 /// Those wanted that are a pointing (is_pointing), as they are wanted.

@@ -153,7 +153,7 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
   Scene with_few = with_candidates(scene, fewest, candidates_, hooks);
   Run few = run_once(with_few, hooks);
   if (!std::exchange(is_timed_, true)) {
-    const TimeError asked{scene.tolerance / 3, 6};
+    const Settling asked{scene.tolerance / 3, 6};
     try {
       settle_time_error(with_few, few, floors_of(scene, few.bodies), asked, hooks, plan);
     } catch (const NumericalError& e) {  // no more digits can be had: those that were reached count

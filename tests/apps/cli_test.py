@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import tomllib
 import time
 import unittest
 import xml.etree.ElementTree as ElementTree
@@ -461,6 +462,18 @@ class RunFiles(Case):
         self.assertEqual(sorted(os.listdir(folder)), ["events.csv", "scene.toml", "state.toml", "summary.json", "trajectory.csv"])
         folder = self.run_sport("--duration", "0.2", "--report", "--vtu-step", "0.1", out="more")
         self.assertLess({"report.html", "motion.pvd", "motion_00000.vtu", "motion_00002.vtu"}, set(os.listdir(folder)))
+
+    def test_run_goes_on_with_the_digits_of_the_other(self):
+        def run(duration, out, *options):
+            self.assert_exit(OK, flexboom("run", "sport-calibration", "--no-budget", "--tolerance", "1e-3", "--duration",
+                                          duration, "--out", self.folder / out, *options))
+            with open(self.folder / out / "scene.toml", "rb") as file:
+                return tomllib.load(file)["integrator"]["tolerance"]
+
+        first = run("60", "first")
+        self.assertLess(first, 1e-3)
+        self.assertLessEqual(run("70", "later", "--continue", self.folder / "first"), first)
+        self.assertNotIn("time integration", "\n".join(self.summary(self.folder / "later")["plan"]))
 
     def test_run_goes_on_where_another_ended(self):
         whole = self.run_sport("--duration", "0.4", out="whole")
