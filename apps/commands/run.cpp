@@ -128,9 +128,7 @@ bool never_flew(const std::filesystem::path& folder) {
 void take_digits(Scene& scene, const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "scene.toml";
   if (!std::filesystem::exists(file)) return;
-  const Scene flown = load_scene(file.string());
-  const double tolerance = flown.step_tolerance() / flown.tolerance * scene.tolerance;
-  if (tolerance < scene.step_tolerance()) scene.integrator_tolerance = tolerance;
+  scene.limit_digits_share(load_scene(file.string()).digits_share());
 }
 
 /// The scene begins with a saved state, whose modes and static shapes replace those of the scene unless they are asked

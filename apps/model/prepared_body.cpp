@@ -209,7 +209,7 @@ ReducedBody with_chosen_modes(const ReducedBody& whole, const std::vector<int>& 
   MatrixXd rest(whole.n(), statics);
   const Eigen::LDLT<MatrixXd> stiffness(whole.Ke);
   for (int k = 0; k < statics; ++k) {
-    const VectorXd load = unit_load(whole, whole.coordinates[static_cast<size_t>(modes + k)]);
+    const VectorXd load = unit_load(whole, whole.coordinates[static_cast<size_t>(modes) + static_cast<size_t>(k)]);
     if (load.size() == 0) {
       rest.col(k) = VectorXd::Unit(whole.n(), modes + k);
       continue;
@@ -228,7 +228,7 @@ ReducedBody with_chosen_modes(const ReducedBody& whole, const std::vector<int>& 
                                                                 rest.transpose() * whole.Me * rest);
   T.rightCols(statics) = rest * ritz.eigenvectors();
   for (int k = 0; k < statics; ++k) {
-    coordinates.push_back(whole.coordinates[static_cast<size_t>(modes + k)]);
+    coordinates.push_back(whole.coordinates[static_cast<size_t>(modes) + static_cast<size_t>(k)]);
     coordinates.back().frequency_hz = std::sqrt(ritz.eigenvalues()[k]) / (2 * std::numbers::pi);
   }
   return combined(whole, T, std::move(coordinates));

@@ -103,6 +103,12 @@ struct Scene {
   double vtu_step = 0;        // [s]; 0: no VTU files
   double tolerance = 1e-6;    // [accuracy] tolerance
   double step_tolerance() const { return integrator_tolerance > 0 ? integrator_tolerance : tolerance; }
+  /// That of the integrator for each of the accuracy: below 1 where outputs need more digits than are asked for.
+  double digits_share() const { return step_tolerance() / tolerance; }
+  /// The integrator gets no more than this share of the accuracy.
+  void limit_digits_share(double share) {
+    if (share * tolerance < step_tolerance()) integrator_tolerance = share * tolerance;
+  }
   std::vector<std::string> outputs;   // [accuracy] outputs; empty: all
   std::vector<std::string> absolute;  // [accuracy] absolute: errors that do not count, "1e-9 rad"
   bool error_budget = true;  // [accuracy] budget: repeat the run with a finer everything and print the differences

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -153,9 +154,9 @@ struct Measuring {
 
 constexpr double least_tolerance = 1e-13;  // of a flight in comparison: below is round-off
 
-/// A digit more from the integrator.
+/// A digit more from the integrator: a number that people can read in the scene that is written.
 Scene with_a_digit_more(Scene scene) {
-  scene.integrator_tolerance = scene.step_tolerance() / 10;
+  scene.integrator_tolerance = std::stod(fmt::format("{:.6g}", scene.step_tolerance() / 10));
   return scene;
 }
 

@@ -31,7 +31,7 @@ SweepRunner::SweepRunner(SceneSource source, SweepValues values, bool loads, boo
   for (const BodyScene& b : with_joints(scene_).bodies)
     if (b.is_boom()) bodies_.get(b, 0, scene_.bodies_kept_in);
   settle();
-  if (scene_.integrator_tolerance != given) share_of_tolerance_ = scene_.step_tolerance() / scene_.tolerance;
+  if (scene_.integrator_tolerance != given) digits_share_ = scene_.digits_share();
   note_columns(scene_);
 }
 
@@ -71,8 +71,7 @@ void SweepRunner::set_options(Scene& scene) const {
       b.modes = scene_.bodies[i].modes, b.shapes = scene_.bodies[i].shapes;
       b.open_directions();
     }
-  if (const double tolerance = share_of_tolerance_ * scene.tolerance; tolerance < scene.step_tolerance())
-    scene.integrator_tolerance = tolerance;
+  if (digits_share_) scene.limit_digits_share(*digits_share_);
   if (loads_) ask_for_loads(scene);
 }
 

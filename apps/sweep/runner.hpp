@@ -55,7 +55,7 @@ class SweepRunner {
   SweepValues values_;
   bool loads_, keep_trajectories_;
   Scene scene_;
-  double share_of_tolerance_ = 1;  // that the integrator of every run gets at most
+  std::optional<double> digits_share_;  // of every run, where the scene as it stands needs more than are asked for
   std::vector<Quantity> quantities_;
   std::vector<std::string> columns_;
   PreparedBodies bodies_;
