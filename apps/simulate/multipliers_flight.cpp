@@ -206,7 +206,7 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
   Multibody all = make_multibody(scene, bodies);
   const Scene open = without_loops(scene);
   const Multibody opened = make_multibody(open, bodies);
-  std::vector<Stiffening> stiffening = first_stiffening(open, opened);
+  std::vector<Stiffening> stiffening = first_stiffening(open, Tree(opened));
   Run r;
   r.bodies = std::move(bodies);
   IntegratorOptions options = integrator_options(scene, hooks, "ida", max_steps);

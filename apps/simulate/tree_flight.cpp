@@ -274,10 +274,10 @@ void set_flown(const Scene& scene, TreeTrajectory flight, Run& r) {
 
 }  // namespace
 
-std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& bodies) {
+std::vector<Stiffening> first_stiffening(const Scene& scene, const Tree& plain) {
+  const Multibody& bodies = plain.scene();
   std::vector<Stiffening> none(bodies.bodies.size(), Stiffening::off);
   if (std::ranges::none_of(bodies.bodies, has_stiffening)) return none;
-  const Tree plain(bodies);
   std::vector<Stiffening> choice =
       stiffening_where_it_counts(plain, first_state(scene, plain), scene.duration, scene.tolerance);
   for (size_t i = 0; i < choice.size(); ++i) {
@@ -321,7 +321,8 @@ void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<
 Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
   const Stopwatch start;
   const Multibody multibody = make_multibody(scene, bodies);
-  std::vector<Stiffening> stiffening = first_stiffening(scene, multibody);
+  const auto plain = std::make_shared<const Tree>(multibody);
+  std::vector<Stiffening> stiffening = first_stiffening(scene, *plain);
   Run r;
   r.bodies = std::move(bodies);
   r.prepare_seconds = start.seconds();
@@ -331,7 +332,6 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   Checkpoint<TreeTrajectory> checkpoint;
   if (hooks.checkpoint)
     checkpoint = [&](const TreeTrajectory& so_far, size_t outputs) {
-      effect = so_far.stiffening_effect;
       if (outputs < told) told = 0;  // another method has begun anew
       if (will_be_revised(scene, multibody, effect, stiffening)) return;
       Run part = r;
@@ -345,15 +345,23 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
       part.integrate_seconds = flight_time.seconds();
       hooks.checkpoint(std::move(part), std::exchange(told, outputs));
     };
+  int ended = 0;
+  const auto look = [&](const std::vector<LargestStiffening>& reached) {
+    constexpr int most_ended = 2;  // a later flight goes on, and shows of all bodies what counts
+    effect = reached;
+    if (ended == most_ended || !will_be_revised(scene, multibody, effect, stiffening)) return;
+    ++ended;
+    throw NumericalError("geometric stiffness counts: the flight without it is of no use");
+  };
   TreeTrajectory flight;
   const auto fly = [&] {
     told = 0;
-    r.tree = std::make_shared<const Tree>(multibody, stiffening);
+    const bool is_plain = std::ranges::count(stiffening, Stiffening::on) == 0;
+    r.tree = is_plain ? plain : std::make_shared<const Tree>(multibody, stiffening);
     IntegratorOptions options = integrator_options(scene, hooks, "auto", max_steps);
     set_corners(scene, options);
     if (scene.from) options.stops = scene.from->stops(joint_names(scene));
-    flight = integrate(*r.tree, first_state(scene, *r.tree), options, checkpoint);
-    effect = flight.stiffening_effect;
+    flight = integrate(*r.tree, first_state(scene, *r.tree), options, checkpoint, look);
     return flight.summary.interrupted;
   };
   fly_until_settled(scene, multibody, effect, stiffening, fly);

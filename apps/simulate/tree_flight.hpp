@@ -27,7 +27,8 @@ std::vector<std::string> joint_names(const Scene&);
 FlightState end_of(const Run&, const Scene&, double time, const Eigen::VectorXd& y, const IntegrationSummary&);
 
 /// Geometric stiffness of each body: as the scene says, "auto" by what its start and prescribed motions make of it.
-std::vector<Stiffening> first_stiffening(const Scene&, const Multibody&);
+/// `plain`: the tree without any.
+std::vector<Stiffening> first_stiffening(const Scene&, const Tree& plain);
 
 /// Turns on what a flight showed to count: `effect` per body. Was there any?
 bool revise_stiffening(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect,

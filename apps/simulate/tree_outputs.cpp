@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace flexboom {
@@ -25,7 +26,7 @@ namespace {
 /// is of it, so that no text is made for the rows behind the first.
 class Columns {
  public:
-  Columns(OutputTable& table, Eigen::Index rows) : table_(table), rows_(rows) {}
+  explicit Columns(Eigen::Index rows) : rows_(rows) {}
 
   void put(std::string_view owner, std::string_view what, double value) { put_part(owner, what, "", value); }
   void put(std::string_view owner, std::string_view what, const Vector3d& v) {
@@ -38,25 +39,28 @@ class Columns {
   }
   void end_row() {
     if (row_ == 0) {
-      table_.values.resize(rows_, std::ssize(first_));
-      table_.values.row(0) = Eigen::Map<const Eigen::RowVectorXd>(first_.data(), std::ssize(first_));
+      by_row_.resize(std::ssize(first_), rows_);
+      by_row_.col(0) = Eigen::Map<const VectorXd>(first_.data(), std::ssize(first_));
     }
-    ++row_, column_ = 0;
+    next_ = ++row_ < rows_ ? by_row_.col(row_).data() : nullptr;
   }
+  OutputTable table() && { return {std::move(names_), by_row_.transpose()}; }
 
  private:
   void put_part(std::string_view owner, std::string_view what, std::string_view part, double value) {
     if (row_ > 0) {
-      table_.values(row_, column_++) = value;
+      *next_++ = value;
       return;
     }
-    table_.names.push_back(fmt::format("{}{}{}", owner, what, part));
+    names_.push_back(fmt::format("{}{}{}", owner, what, part));
     first_.push_back(value);
   }
 
-  OutputTable& table_;
+  std::vector<std::string> names_;
   std::vector<double> first_;  // row
-  Eigen::Index rows_, row_ = 0, column_ = 0;
+  Eigen::MatrixXd by_row_;     // a column for each
+  Eigen::Index rows_, row_ = 0;
+  double* next_ = nullptr;  // value of the row
 };
 
 /// `centre`: where the scene has the mass centre, which flies along the orbit.
@@ -133,8 +137,7 @@ class Pointing {
 
 OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
                          const std::function<void(size_t row, Moment&)>& moment) {
-  OutputTable table;
-  Columns out(table, static_cast<Eigen::Index>(rows));
+  Columns out(static_cast<Eigen::Index>(rows));
   const Pointing pointing(scene);
   Vector3d centre = Vector3d::Zero();
   if (tree.scene().field) centre = mass_centre(tree, start_state(without_loops(scene), tree));
@@ -167,7 +170,7 @@ OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
     out.put("energy", ".work", e.work);
     out.end_row();
   }
-  return table;
+  return std::move(out).table();
 }
 
 OutputTable output_table(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) {
@@ -175,11 +178,12 @@ OutputTable output_table(const Scene& scene, const Tree& tree, const TreeTraject
   const auto branches = [&](size_t row) {
     return motion.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(motion.laws[row]);
   };
+  const TreeWorkspaceHandle work = tree.workspace();
   return output_table(scene, tree, motion.time.size(), [&](size_t row, Moment& now) {
     const VectorXd& y = motion.y[row];
     now.time = motion.time[row], now.balance = motion.balance[row];
     tree.unpack(y, now.state);
-    if (loads) now.loads = tree.joint_loads(now.time, y, closed_stops(tree, y), branches(row));
+    if (loads) now.loads = tree.joint_loads(now.time, y, closed_stops(tree, y), *work, branches(row));
   });
 }
 

@@ -22,6 +22,8 @@ constexpr double pi = std::numbers::pi;
 
 /// x with x - a sin x + b (1 - cos x) = M, |M| <= pi: Newton in a bracket; the left side ascends.
 double anomaly_passed(double a, double b, double M) {
+  constexpr double circle = 1e-16;
+  if (std::abs(a) + std::abs(b) < circle) return M;
   double low = M - 2.5, high = M + 2.5, x = M;  // |a sin x - b (1 - cos x)| <= 2 e
   for (int i = 0; i < 60; ++i) {
     const double s = std::sin(x), half = std::sin(x / 2), F = x - a * s + 2 * b * half * half - M;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace flexboom {
 
@@ -31,19 +32,31 @@ namespace {
 
 /// What each of m modes has of an entry of x, beyond where the remainder n holds it: the real part of
 /// f (lambda z + n) / lambda, where f are its eigenvectors there, with the sign of the imaginary parts turned. Parts in
-/// halves of m. `rate`: the square of the same times lambda. Of lambda = 0 the share is no number.
+/// halves of m. `rate`: the square of the same times lambda. Of lambda = 0 the share is none.
 FLEXBOOM_FOR_EACH_PROCESSOR
 void shares_of(Index m, const double* lambda_re, const double* lambda_im, const double* f, const double* z,
                const double* n, double* share, double* rate) {
 #pragma GCC ivdep
   for (Index k = 0; k < m; ++k) {
-    const double x = lambda_re[k], y = lambda_im[k], inverse = 1 / (x * x + y * y);
+    const double x = lambda_re[k], y = lambda_im[k], square = x * x + y * y, inverse = square > 0 ? 1 / square : 0;
     const double re = x * z[k] - y * z[m + k] + n[k], im = x * z[m + k] + y * z[k] + n[m + k];
     const double r = f[k] * re + f[m + k] * im, i = f[k] * im - f[m + k] * re;
     share[k] = (r * x + i * y) * inverse;
     share[m + k] = (i * x - r * y) * inverse;
     rate[k] = r * r + i * i;
   }
+}
+
+/// The sizes of shares together, of modes whose |lambda|^2 is not less than `least`.
+FLEXBOOM_FOR_EACH_PROCESSOR
+double sum_of_fast(Index m, double least, const double* lambda_re, const double* lambda_im, const double* share) {
+  double sum = 0;
+  for (Index k = 0; k < m; ++k) {
+    const double x = lambda_re[k], y = lambda_im[k],
+                 size = std::sqrt(share[k] * share[k] + share[m + k] * share[m + k]);
+    sum += x * x + y * y < least ? 0 : size;
+  }
+  return sum;
 }
 
 }  // namespace
@@ -58,8 +71,13 @@ void StopSearch::take_shares(const CollocatedStep& step, int entry, int point) {
 
 std::complex<double> StopSearch::share_of(Index mode) const { return {shares_[mode], shares_[rates_.size() + mode]}; }
 
-StopSearch::Ripple StopSearch::ripple(const CollocatedStep& step, int gap, int point) {
-  take_shares(step, gap, point);
+double StopSearch::widest_ripple(const CollocatedStep& step) const {
+  const LinearPart& linear = *step.linear;
+  return sum_of_fast(rates_.size(), 4 / (step.length * step.length), linear.lambda_re().data(),
+                     linear.lambda_im().data(), shares_.data());
+}
+
+StopSearch::Ripple StopSearch::ripple(const CollocatedStep& step) {
   const double fastest = rates_.maxCoeff();
   double widest = 0;
   fast_.clear();
@@ -145,7 +163,10 @@ double StopSearch::first_crossing(const CollocatedStep& step, int hinge, double 
   const auto at_point = [&](int j) {
     return Clearance{collocation::node(j), side * (step.X(gap, j) - level), side * step.length * step.X(rate, j)};
   };
-  const Ripple at_start = ripple(step, gap, 0);
+  double nearest = std::numeric_limits<double>::infinity();  // of the points to the level
+  for (int j = 0; j < collocation::points; ++j) nearest = std::min(nearest, at_point(j).value);
+  take_shares(step, gap, 0);
+  const Ripple at_start = nearest > 2 * widest_ripple(step) ? Ripple{} : ripple(step);
   const double resolution = 4e-16 * std::max(1.0, std::abs(step.start) / step.length);
   const auto parts_of = [](const Ripple& r, const Clearance& from, const Clearance& to) {
     constexpr double most = 4096;
@@ -157,7 +178,10 @@ double StopSearch::first_crossing(const CollocatedStep& step, int hinge, double 
   for (int j = 1; j < collocation::points && from.c <= end; ++j) {
     const Clearance to = at_point(j);
     int parts = parts_of(at_start, from, to);
-    if (parts > 1 && j > 1) parts = parts_of(ripple(step, gap, j - 1), from, to);  // what is left of it
+    if (parts > 1 && j > 1) {
+      take_shares(step, gap, j - 1);
+      parts = parts_of(ripple(step), from, to);  // what is left of it
+    }
     const double root = parts == 1 ? crossing_between(at, from, to, resolution)
                                    : crossing_at_places(step, at, from, to, {gap, j, parts, side, resolution});
     if (root <= 1) return root;

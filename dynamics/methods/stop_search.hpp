@@ -50,8 +50,10 @@ class StopSearch {
   void take_shares(const CollocatedStep&, int entry, int point);
   std::complex<double> share_of(Eigen::Index mode) const;
 
-  /// Of a gap (an entry of x) from a point of the step on; sets `fast_`.
-  Ripple ripple(const CollocatedStep&, int gap, int point);
+  /// Of what `take_shares` took; sets `fast_`.
+  Ripple ripple(const CollocatedStep&);
+  /// No less than its amplitude, at a small part of the cost.
+  double widest_ripple(const CollocatedStep&) const;
   double first_crossing(const CollocatedStep&, int hinge, double level, double side, double end);
 
   struct Places {

@@ -16,11 +16,12 @@ using spatial::Vec3;
 namespace {
 
 /// Everything at (t, y), each link by itself.
-tree::Scratch<double> evaluated(const Tree& system, const tree::Model& model, double t,
-                                const Eigen::Ref<const VectorXd>& y, std::span<const char> contact,
-                                std::span<const LawBranch> laws) {
+tree::Scratch<double>& evaluated(const Tree& system, const tree::Model& model, double t, const VectorXd& y,
+                                 std::span<const char> contact, TreeWorkspace& work, std::span<const LawBranch> laws) {
   require(y.size() == system.layout().size, "the state has the wrong size");
-  return tree::link_by_link(model, t, y, contact, laws);
+  if (work.alone == nullptr) work.alone = std::make_unique<tree::Scratch<double>>(model, false);
+  tree::link_by_link(model, t, y, contact, laws, *work.alone);
+  return *work.alone;
 }
 
 void add_joint_energy(const tree::Link& link, const Joint& joint, const Eigen::Ref<const VectorXd>& y,
@@ -56,7 +57,7 @@ Balance Tree::balance(double t, const Eigen::Ref<const VectorXd>& y, TreeWorkspa
     near = {link.a.position + link.a.axes * spatial::vec3(R), link.a.axes * spatial::vec3(V)};
     break;
   }
-  const tree::Totals all = tree::totals(model, y.data(), work.instant, near, scratch);
+  const tree::Totals all = tree::totals(model, y.data(), work.instant, near, scratch, {}, false);
   Balance b;
   const Vector3d P = eigen(all.momentum), V = eigen(near.velocity);
   b.bodies = all.kinetic;
@@ -123,12 +124,11 @@ PlaceMotionInSpace Tree::motion(double t, const Eigen::Ref<const VectorXd>& stat
   return in_space(model, place, y, scratch);
 }
 
-std::vector<JointLoad> Tree::joint_loads(double t, const Eigen::Ref<const VectorXd>& y, std::span<const char> contact,
-                                         std::span<const LawBranch> laws) const {
+std::vector<JointLoad> Tree::joint_loads(double t, const VectorXd& y, std::span<const char> contact,
+                                         TreeWorkspace& work, std::span<const LawBranch> laws) const {
   const tree::Model& model = impl_->model;
-  const tree::Scratch<double> scratch = evaluated(*this, model, t, y, contact, laws);
+  const tree::Scratch<double>& scratch = evaluated(*this, model, t, y, contact, work, laws);
   std::vector<JointLoad> loads(impl_->scene.joints.size());
-  const VectorXd state = y;
   tree::Instant instant(model);
   tree::set_instant(model, t, instant);
   for (size_t i = 0; i < model.links.size(); ++i) {
@@ -137,18 +137,16 @@ std::vector<JointLoad> Tree::joint_loads(double t, const Eigen::Ref<const Vector
     const tree::LinkScratch<double>& s = scratch.links[i];
     JointLoad& out = loads[static_cast<size_t>(link.joint)] = load_on_b(s);
     for (int k = 0; link.prescribed && k < joint_type(link.kind).scalars; ++k)
-      out.drive.push_back(tree::drive_load(link, k, state.data(), instant.drives[i], {},
-                                           contact[static_cast<size_t>(link.joint)] != 0, s));
+      out.drive.push_back(
+          tree::drive_load(link, k, y.data(), instant.drives[i], {}, contact[static_cast<size_t>(link.joint)] != 0, s));
   }
   return loads;
 }
 
-std::vector<StiffeningEffect> Tree::stiffening_effect(double t, const Eigen::Ref<const VectorXd>& state,
-                                                      std::span<const char> contact,
-                                                      std::span<const LawBranch> laws) const {
+std::vector<StiffeningEffect> Tree::stiffening_effect(double t, const VectorXd& y, std::span<const char> contact,
+                                                      TreeWorkspace& work, std::span<const LawBranch> laws) const {
   const tree::Model& model = impl_->model;
-  const VectorXd y = state;
-  tree::Scratch<double> scratch = evaluated(*this, model, t, y, contact, laws);
+  tree::Scratch<double>& scratch = evaluated(*this, model, t, y, contact, work, laws);
   LoadedBodies bodies(impl_->scene, [&](const Place& place) { return in_space(model, place, y, scratch); });
   std::vector<JointLoad> loads(impl_->scene.joints.size());
   for (size_t i = 0; i < model.links.size(); ++i) {

@@ -1,5 +1,6 @@
 #include "dynamics/relative/body_constants.hpp"
 
+#include "reduction/body/diagonal.hpp"
 #include "reduction/body/tilde.hpp"
 
 #include <Eigen/Cholesky>
@@ -52,14 +53,6 @@ std::vector<equations::Term> non_zeros(int n, int second, int components, Entry 
 double symmetric_entry(const Matrix3d& m, int component) {
   constexpr int row[] = {0, 1, 2, 0, 1, 2}, column[] = {0, 1, 2, 1, 2, 0};
   return m(row[component], column[component]);
-}
-
-bool is_diagonal(const MatrixXd& m) {
-  const VectorXd d = m.diagonal().cwiseAbs().cwiseSqrt();
-  for (Eigen::Index i = 0; i < m.rows(); ++i)
-    for (Eigen::Index j = 0; j < m.cols(); ++j)
-      if (i != j && std::abs(m(i, j)) > 1e-12 * d[i] * d[j]) return false;  // modes are orthogonal to round-off
-  return true;
 }
 
 }  // namespace

@@ -39,7 +39,8 @@ void add_spread(const C& m, const Vec3<C>& a, const Vec3<C>& b, Sym3<C>& J) {
 /// H = mc x v + J w + Cr q_dot, 2 T = v . P + w . H + q_dot . (Ct^T v + Cr^T w + Me q_dot).
 template <class C>
 void add(const equations::BodyOf<C>& b, const std::vector<Vec3<C>>& Ct, const std::vector<C>& Me, bool diagonal,
-         const LinkScratch<C>& s, const C* q, const C* q_dot, const Reference& reference, int count, Totals& to) {
+         const LinkScratch<C>& s, const C* q, const C* q_dot, const Reference& reference, int count, bool with_inertia,
+         Totals& to) {
   const auto n = static_cast<size_t>(b.n);
   const Vec3<C> v = transposed_product(s.A0, s.v0 - equations::lift<C>(reference.velocity)), &w = s.w;
   Vec3<C> slid{}, turned{};  // Ct q_dot, Cr q_dot
@@ -57,14 +58,16 @@ void add(const equations::BodyOf<C>& b, const std::vector<Vec3<C>>& Ct, const st
   const C twice_kinetic = dot(v, linear) + dot(w, angular) + dot(v, slid) + dot(w, turned) + twice_modal;
   const Vec3<C> P = s.A0 * linear, H = s.A0 * angular, c = s.A0 * s.mc;
   const Vec3<C> R = s.R0 - equations::lift<C>(reference.position);
-  Sym3<C> J = equations::rotate(s.A0, s.J);
-  add_spread(b.m, R, R, J);
-  add_spread(C(2.0), R, c, J);
+  if (with_inertia) {
+    Sym3<C> J = equations::rotate(s.A0, s.J);
+    add_spread(b.m, R, R, J);
+    add_spread(C(2.0), R, c, J);
+    to.inertia += together(J, count);
+  }
   to.m += together(b.m, count);
   to.first_moment += together(b.m * R + c, count);
   to.momentum += together(P, count);
   to.angular_momentum += together(H + cross(R, P), count);
-  to.inertia += together(J, count);
   to.kinetic += 0.5 * together(twice_kinetic, count);
   to.strain += 0.5 * together(twice_strain, count);
   for (int i = 0; i < count; ++i) {
@@ -73,17 +76,17 @@ void add(const equations::BodyOf<C>& b, const std::vector<Vec3<C>>& Ct, const st
   }
 }
 
-void add(const Model& model, size_t i, const double* y, const Reference& reference, LinkScratch<double>& s,
-         Totals& to) {
+void add(const Model& model, size_t i, const double* y, const Reference& reference, bool with_inertia,
+         LinkScratch<double>& s, Totals& to) {
   const Link& link = model.links[i];
   s.I = {};
   add_body(link, y, s);
   const equations::Body& b = link.body;
   const double *q = y + link.q, *q_dot = y + link.q_dot;
   if (link.second_order)
-    add(b, s.second_order.Ct, s.second_order.Me, false, s, q, q_dot, reference, 1, to);
+    add(b, s.second_order.Ct, s.second_order.Me, false, s, q, q_dot, reference, 1, with_inertia, to);
   else
-    add(b, b.Ct, b.Me, b.diagonal, s, q, q_dot, reference, 1, to);
+    add(b, b.Ct, b.Me, b.diagonal, s, q, q_dot, reference, 1, with_inertia, to);
 }
 
 /// Adds one body, or `count` side by side, by its shapes Q, after poses.
@@ -128,11 +131,11 @@ MassMotion mass_motion(const Model& model, const double* y, const Instant& insta
 
 FLEXBOOM_INNER_LOOP
 Totals totals(const Model& model, const double* y, const Instant& instant, const Reference& reference,
-              Scratch<double>& scratch, HungOn bodies) {
+              Scratch<double>& scratch, HungOn bodies, bool with_inertia) {
   move_links(model, y, instant, true, scratch);
   Totals r;
   for (const size_t i : scratch.singles)
-    if (bodies.counts(i)) add(model, i, y, reference, scratch.links[i], r);
+    if (bodies.counts(i)) add(model, i, y, reference, with_inertia, scratch.links[i], r);
   for (size_t i = 0; i < scratch.leaves.size(); ++i) {
     const Leaves& leaves = model.leaves[i];
     if (!bodies.counts(static_cast<size_t>(leaves.link[0]))) continue;
@@ -140,7 +143,7 @@ Totals totals(const Model& model, const double* y, const Instant& instant, const
     const equations::BodyOf<Quad>& b = leaves.body;
     s.link.I = {};
     add_body(b, s.q.data(), s.q_dot.data(), s.link);
-    add(b, b.Ct, b.Me, b.diagonal, s.link, s.q.data(), s.q_dot.data(), reference, leaves.count, r);
+    add(b, b.Ct, b.Me, b.diagonal, s.link, s.q.data(), s.q_dot.data(), reference, leaves.count, with_inertia, r);
   }
   for (size_t i = 0; i < model.wheels.size(); ++i) {  // rotors have no mass of their own
     const auto link = static_cast<size_t>(model.wheels[i].link);
@@ -152,7 +155,7 @@ Totals totals(const Model& model, const double* y, const Instant& instant, const
     r.spinning += 0.5 * J * spin * spin;
     r.angular_momentum += (J * spin) * in_space;
     r.angular_momentum_scale += std::abs(J * spin);
-    subtract_dyad(r.inertia, -J, in_space);
+    if (with_inertia) subtract_dyad(r.inertia, -J, in_space);
   }
   return r;
 }

@@ -42,8 +42,9 @@ struct HungOn {
 };
 
 /// Both move all links, poses included. `reference`: by its position and velocity in y, or what else is near the
-/// bodies.
-Totals totals(const Model&, const double* y, const Instant&, const Reference&, Scratch<double>&, HungOn = {});
+/// bodies. The inertia is zero where it is not asked for.
+Totals totals(const Model&, const double* y, const Instant&, const Reference&, Scratch<double>&, HungOn = {},
+              bool with_inertia = true);
 MassMotion mass_motion(const Model&, const double* y, const Instant&, const Reference&, Scratch<double>&, HungOn = {});
 
 }  // namespace flexboom::tree

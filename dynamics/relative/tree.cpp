@@ -44,16 +44,14 @@ void set_instant(const Model& model, double t, Instant& instant) {
   }
 }
 
-Scratch<double> link_by_link(const Model& model, double t, const VectorXd& y, std::span<const char> contact,
-                             std::span<const LawBranch> laws) {
-  Scratch<double> scratch(model, false);
+void link_by_link(const Model& model, double t, const VectorXd& y, std::span<const char> contact,
+                  std::span<const LawBranch> laws, Scratch<double>& scratch) {
   Instant instant(model);
   set_instant(model, t, instant);
   instant.laws = laws;
   VectorXd y_dot(y.size());
   derivative(model, y.data(), instant, contact, scratch, y_dot.data());
   move_links(model, y.data(), instant, true, scratch);
-  return scratch;
 }
 
 }  // namespace tree
@@ -100,7 +98,8 @@ std::string mass_fault(const Multibody& scene, const tree::Link& link, const tre
 void check_inertia(const Tree& system, const tree::Model& model) {
   const VectorXd y = system.pack(system.at_rest());
   const std::vector<char> open(system.scene().joints.size(), 0);
-  const tree::Scratch<double> scratch = tree::link_by_link(model, 0, y, open, {});
+  tree::Scratch<double> scratch(model, false);
+  tree::link_by_link(model, 0, y, open, {}, scratch);
   for (size_t i = model.links.size(); i-- > 0;) {  // tips first: what is bad there spoils all before
     const tree::Link& link = model.links[i];
     const tree::LinkScratch<double>& s = scratch.links[i];
@@ -150,7 +149,8 @@ bool is_sound(const tree::Model& model, const tree::Scratch<double>& scratch) {
 void report_mass(const tree::Model& model, double t, const VectorXd& y, std::span<const char> contact,
                  std::span<const LawBranch> laws) {
   if (!y.allFinite()) return;
-  const tree::Scratch<double> scratch = tree::link_by_link(model, t, y, contact, laws);
+  tree::Scratch<double> scratch(model, false);
+  tree::link_by_link(model, t, y, contact, laws, scratch);
   for (size_t i = model.links.size(); i-- > 0;) {
     const std::string fault = mass_fault(*model.scene, model.links[i], scratch.links[i]);
     if (!fault.empty()) throw UnfitState(fmt::format("t = {:.9g} s: {}", t, fault));

@@ -147,13 +147,12 @@ class Tree {
   Balance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y, TreeWorkspace&) const;
   Balance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& state) const;
   PlaceMotionInSpace motion(double t, const Eigen::Ref<const Eigen::VectorXd>& state, const Place&) const;
-  std::vector<JointLoad> joint_loads(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
-                                     std::span<const char> contact, std::span<const LawBranch> laws = {}) const;
+  std::vector<JointLoad> joint_loads(double t, const Eigen::VectorXd& y, std::span<const char> contact, TreeWorkspace&,
+                                     std::span<const LawBranch> laws = {}) const;
 
   /// Of each body.
-  std::vector<StiffeningEffect> stiffening_effect(double t, const Eigen::Ref<const Eigen::VectorXd>& y,
-                                                  std::span<const char> contact,
-                                                  std::span<const LawBranch> laws = {}) const;
+  std::vector<StiffeningEffect> stiffening_effect(double t, const Eigen::VectorXd& y, std::span<const char> contact,
+                                                  TreeWorkspace&, std::span<const LawBranch> laws = {}) const;
 
   struct Impl;
   const Impl& impl() const { return *impl_; }

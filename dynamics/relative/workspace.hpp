@@ -4,6 +4,8 @@
 
 #include "dynamics/relative/forces.hpp"
 
+#include <memory>
+
 namespace flexboom {
 
 class TreeWorkspace {
@@ -18,6 +20,7 @@ class TreeWorkspace {
   tree::Scratch<D> dual;
   std::vector<D> in, out;
   tree::Instant instant;
+  std::unique_ptr<tree::Scratch<double>> alone;  // each link by itself; made when first asked for
 };
 
 namespace tree {
@@ -25,9 +28,9 @@ namespace tree {
 /// Evaluates all functions of time.
 void set_instant(const Model&, double t, Instant&);
 
-/// Everything at (t, y), poses included, each link by itself.
-Scratch<double> link_by_link(const Model&, double t, const Eigen::VectorXd& y, std::span<const char> contact,
-                             std::span<const LawBranch> laws);
+/// Everything at (t, y), poses included, each link by itself: into a scratch that was made so.
+void link_by_link(const Model&, double t, const Eigen::VectorXd& y, std::span<const char> contact,
+                  std::span<const LawBranch> laws, Scratch<double>&);
 
 }  // namespace tree
 }  // namespace flexboom

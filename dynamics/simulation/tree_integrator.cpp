@@ -66,7 +66,7 @@ class Pilot {
 class TreeFlight final : public Flight<TreeTrajectory> {
  public:
   TreeFlight(const Tree& tree, const VectorXd& y0, const IntegratorOptions& options, const IntegratorMethod& method,
-             const Checkpoint<TreeTrajectory>& so_far, Pilot* pilot = nullptr)
+             const Checkpoint<TreeTrajectory>& so_far, const StiffeningLook& look, Pilot* pilot = nullptr)
       : Flight(options, so_far, stops_of(tree), tree.scene().joints.size(), Laws(tree.scene().joints, options)),
         tree_(tree),
         scales_(tree, y0, method.local_share * options.tolerance, options.rescale_at_events),
@@ -76,6 +76,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
         exact_in_linear_part_(method.make_split != nullptr),
         accuracy_(options.accuracy > 0 ? options.accuracy : options.tolerance),
         pilot_(pilot),
+        look_(look),
         work_(tree.workspace()),
         has_stiffening_(
             std::ranges::any_of(tree.scene().bodies, [](const ReducedBody& b) { return !b.Kg.spin.empty(); })),
@@ -228,7 +229,8 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     if (result_.time.size() % stride != 0) return;
     std::vector<char> contact(tree_.scene().joints.size(), 0);
     for (size_t i = 0; i < contacts_.size(); ++i) contact[contacts_.stop(i).joint] = contacts_.closed()[i];
-    flexboom::observe(tree_.stiffening_effect(t, y, contact, laws_.branches()), t, effect_);
+    flexboom::observe(tree_.stiffening_effect(t, y, contact, *work_, laws_.branches()), t, effect_);
+    if (look_) look_(effect_);
   }
 
   void finish() override {
@@ -257,6 +259,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   double accuracy_;
   double fastest_turn_ = 0;  // of a floating body [rad/s]
   Pilot* pilot_;
+  const StiffeningLook& look_;
   TreeWorkspaceHandle work_;
   bool has_stiffening_;                    // has any body a Kg?
   std::vector<LargestStiffening> effect_;  // per body
@@ -320,7 +323,7 @@ std::vector<char> closed_stops(const Tree& tree, const Eigen::Ref<const VectorXd
 }
 
 TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorOptions& o,
-                         const Checkpoint<TreeTrajectory>& so_far) {
+                         const Checkpoint<TreeTrajectory>& so_far, const StiffeningLook& look) {
   check_options(o, tree.scene().joints.size());
   require(y0.size() == tree.layout().size && y0.allFinite(), "the start state has the wrong size or is not finite");
   if (tree.scene().field) tree.scene().field->orbit.at(o.duration);  // does it last so long?
@@ -330,7 +333,7 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   VectorXd start = y0;
   tree.impose(o.start, start);
   const auto fly = [&](const std::string& method, const std::string& why) {
-    TreeTrajectory r = TreeFlight(tree, start, o, integrator_method(method), so_far).fly();
+    TreeTrajectory r = TreeFlight(tree, start, o, integrator_method(method), so_far, look).fly();
     r.summary.why_method = why;
     return r;
   };
@@ -338,7 +341,7 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   if (has_laws) return fly("bdf", "joints have laws");
   try {
     Pilot pilot;
-    TreeTrajectory r = TreeFlight(tree, start, o, integrator_method("exponential"), so_far, &pilot).fly();
+    TreeTrajectory r = TreeFlight(tree, start, o, integrator_method("exponential"), so_far, look, &pilot).fly();
     r.summary.why_method = pilot.why();
     return r;
   } catch (const Pilot::Unsuitable& reason) {
@@ -360,10 +363,11 @@ std::vector<Stiffening> stiffening_where_it_counts(const Tree& tree, VectorXd y,
       std::ranges::any_of(scene.joints, [](const Joint& joint) { return !joint.prescribed.empty(); }) ||
       std::ranges::any_of(scene.wheels, [](const ReactionWheel& w) { return static_cast<bool>(w.torque); });
   const int samples = goes_with_time ? 100 : 0;
+  const TreeWorkspaceHandle work = tree.workspace();
   for (int i = 0; i <= samples; ++i) {
     const double t = i == 0 ? 0 : duration * i / samples;
     tree.impose(t, y);
-    const std::vector<StiffeningEffect> effect = tree.stiffening_effect(t, y, open);
+    const std::vector<StiffeningEffect> effect = tree.stiffening_effect(t, y, open, *work);
     for (size_t b = 0; b < effect.size(); ++b)
       if (change_without_stiffening(scene.bodies[b], effect[b].size, duration) > tolerance) choice[b] = Stiffening::on;
   }

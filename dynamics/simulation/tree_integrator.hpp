@@ -44,10 +44,13 @@ struct TreeTrajectory {
   std::vector<std::string> warnings;
 };
 
+/// Is told what stiffening has reached, per body, after each look at it; may throw to end a flight.
+using StiffeningLook = std::function<void(const std::vector<LargestStiffening>&)>;
+
 /// Flies the tree from y0. Method "auto": the one that suits its start, and bdf where that fails.
 /// @throws InputError for an unknown method or bad options; NumericalError when the method fails.
 TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const IntegratorOptions&,
-                         const Checkpoint<TreeTrajectory>& = {});
+                         const Checkpoint<TreeTrajectory>& = {}, const StiffeningLook& = {});
 
 /// For each body: on where the geometric stiffness changes more than `tolerance` (`change_without_stiffening`), by what
 /// it is at the start or, at rest relative to them, under the prescribed motions until `duration` [s].

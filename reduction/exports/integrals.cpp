@@ -1,6 +1,7 @@
 #include "reduction/exports/integrals.hpp"
 
 #include "fem/base/check.hpp"
+#include "reduction/body/diagonal.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
@@ -13,14 +14,6 @@ namespace flexboom {
 namespace {
 
 using Eigen::MatrixXd;
-
-/// Off-diagonal round-off that solvers leave in generalised masses and stiffnesses.
-bool is_diagonal(const MatrixXd& A) {
-  const Eigen::ArrayXd scale = A.diagonal().array().abs().sqrt();
-  MatrixXd rest = A;
-  rest.diagonal().setZero();
-  return (rest.array().abs() <= 1e-12 * (scale.matrix() * scale.matrix().transpose()).array()).all();
-}
 
 void transform(std::vector<MatrixXd>& matrices, const MatrixXd& T) {
   for (MatrixXd& K : matrices) K = (T.transpose() * K * T).eval();

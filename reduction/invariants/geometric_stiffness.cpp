@@ -5,6 +5,7 @@
 #include "fem/linear_algebra/dense.hpp"
 #include "fem/mesh/shape_pairs.hpp"
 #include "reduction/basis/static_shapes.hpp"
+#include "reduction/body/diagonal.hpp"
 #include "reduction/body/geometric_stiffness_loads.hpp"
 
 #include <fmt/format.h>
@@ -173,9 +174,16 @@ MatrixXd marker_stiffness(const ReducedBody& body, const std::string& marker, co
 
 std::array<double, 2> relative_stiffness(const ReducedBody& body, const MatrixXd& Kg) {
   if (body.n() == 0 || Kg.isZero(0)) return {0, 0};
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(Kg, body.Ke, Eigen::EigenvaluesOnly);
-  if (solver.info() != Eigen::Success) return {0, 0};
-  return {solver.eigenvalues().minCoeff(), solver.eigenvalues().maxCoeff()};
+  VectorXd values;
+  if (is_diagonal(body.Ke) && body.Ke.diagonal().minCoeff() > 0) {  // as that of modes is
+    const VectorXd scale = body.Ke.diagonal().cwiseSqrt().cwiseInverse();
+    values = (scale.asDiagonal() * Kg * scale.asDiagonal()).eval().selfadjointView<Eigen::Lower>().eigenvalues();
+  } else {
+    const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(Kg, body.Ke, Eigen::EigenvaluesOnly);
+    if (solver.info() != Eigen::Success) return {0, 0};
+    values = solver.eigenvalues();
+  }
+  return {values.minCoeff(), values.maxCoeff()};
 }
 
 }  // namespace flexboom

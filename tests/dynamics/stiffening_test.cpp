@@ -459,6 +459,27 @@ TEST(Stiffening, LeftOutItDriftsByHalfOfItForEachRadian) {
     }
 }
 
+TEST(Stiffening, WhoLooksAtItMayEndAFlight) {
+  const Tree tree(rotor(stiffened_boom({10, 1.2, 1.4e4}, 3, eq14::Planes::xy), spin_up()));
+  IntegratorOptions o;
+  o.method = "bdf", o.tolerance = 1e-6;
+  o.duration = 15, o.output_step = 0.1;
+  constexpr double counts = 0.1;
+  double last = 0;
+  int looks = 0;
+  const StiffeningLook look = [&](const std::vector<LargestStiffening>& effect) {
+    ++looks;
+    EXPECT_GE(effect.at(0).size, last);  // the largest so far
+    last = effect[0].size;
+    if (last > counts) throw NumericalError("enough");
+  };
+  EXPECT_THROW(integrate(tree, at_start(tree), o, {}, look), NumericalError);
+  EXPECT_GT(looks, 10);
+  EXPECT_LT(looks, 100);  // of 150: the spin grows like the cube of time at first
+  const TreeTrajectory whole = integrate(tree, at_start(tree), o);
+  EXPECT_GT(whole.stiffening_effect[0].size, 10 * counts);
+}
+
 TEST(Stiffening, SpinUpWithoutItDivergesAndIsWarnedAbout) {
   const SpinUp off = spin_up_run(3, Stiffening::off, 15);
   EXPECT_GT(off.error, 10);

@@ -244,7 +244,7 @@ TEST(TreeFlight, StaticLoadsOfJointsAreTheWeight) {
   const Tree tree(scene);
   VectorXd y = tree.pack(tree.at_rest());
   tree.impose(0, y);
-  const std::vector<JointLoad> loads = tree.joint_loads(0, y, std::vector<char>(2, 0));
+  const std::vector<JointLoad> loads = tree.joint_loads(0, y, std::vector<char>(2, 0), *tree.workspace());
   EXPECT_NEAR(loads[0].force.y(), 2 * 0.5 * 9.81, 1e-13);
   EXPECT_NEAR(loads[0].drive[0], 2 * 0.5 * 9.81, 1e-13);  // mass centre of both at 1 m
   EXPECT_NEAR(loads[1].drive[0], 0.5 * 9.81 * 0.5, 1e-13);

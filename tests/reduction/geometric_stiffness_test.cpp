@@ -347,6 +347,24 @@ TEST(GeometricStiffness, OfAnAccelerationIsThatOfItsInertialForces) {
   }
 }
 
+TEST(GeometricStiffness, ItsSizeDoesNotDependOnTheCoordinates) {
+  // Coordinates of modes, whose Ke is diagonal, and others that span the same.
+  ReducedBody modes, mixed;
+  modes.Me = MatrixXd::Identity(4, 4);
+  modes.Ke = Eigen::Vector4d(3, 40, 500, 6000).asDiagonal();
+  modes.Ct = mixed.Ct = Eigen::Matrix3Xd::Zero(3, 4);
+  MatrixXd Kg(4, 4), T(4, 4);
+  Kg << -2, 1, 0.5, 3, 1, 7, -4, 2, 0.5, -4, 90, 8, 3, 2, 8, -700;
+  T << 1, 0.2, -0.3, 0.1, 0, 1, 0.4, 0.2, 0.1, 0, 1, -0.5, 0, 0.3, 0, 1;
+  mixed.Me = T.transpose() * T;
+  mixed.Ke = T.transpose() * modes.Ke * T;
+  ASSERT_EQ(modes.n(), 4);
+  const auto here = relative_stiffness(modes, Kg), there = relative_stiffness(mixed, T.transpose() * Kg * T);
+  for (size_t i = 0; i < 2; ++i) EXPECT_NEAR(here[i], there[i], 1e-12 * std::abs(here[i]));  // round-off
+  EXPECT_LT(here[0], -2.0 / 3);                                                              // what the diagonal has
+  EXPECT_GT(here[1], 90.0 / 500);
+}
+
 TEST(GeometricStiffness, DoesNotDependOnThreadsNorOnWhoFactorises) {
   const Model model = beam(strip, length, BeamTheory::timoshenko, 9, 3);
   const ModalBasis basis =
