@@ -25,13 +25,26 @@ constexpr int most_steps = 3;        // to finer meshes
 
 bool is_solid(const Model& model) { return model.body && model.body->structure == "solid"; }
 
-/// May the program refine the mesh? It may where only the accuracy of hexahedra is given.
-bool follows_accuracy(const Model& model) {
-  if (!is_solid(model)) return false;
-  const SolidOptions& s = model.body->solid;
+/// Is the mesh of a solid boom left to the program? It is where only the accuracy of hexahedra is given.
+bool follows_accuracy(const BodyScene& body) {
+  const SolidOptions& s = body.solid;
   const SolidGrading& g = s.grading;
-  return s.element == "hex" && s.order == 0 && g.sectors == 0 && g.rings == 0 && g.long_elements == 0 &&
-         g.end_layers < 0 && g.first_layer == 0 && g.growth == 0 && g.corner_levels < 0 && g.factor == 0;
+  return body.structure == "solid" && s.element == "hex" && s.order == 0 && g.sectors == 0 && g.rings == 0 &&
+         g.long_elements == 0 && g.end_layers < 0 && g.first_layer == 0 && g.growth == 0 && g.corner_levels < 0 &&
+         g.factor == 0;
+}
+
+/// Of errors of the program's own meshes of one section. Its edges along the boom are singular where they are
+/// re-entrant, and no mesh is refined toward them.
+double slowest_fall(const SectionShape& section) {
+  constexpr double round_bar = 0.25, tube = 0.4, rectangle = 0.35, strip = 0.5, singular = 0.7;
+  if (std::holds_alternative<RoundBar>(section)) return round_bar;
+  if (std::holds_alternative<Tube>(section)) return tube;
+  if (const auto* r = std::get_if<Rectangle>(&section)) {
+    constexpr double most = 4;  // width by height of one that is no strip
+    return std::max(r->height, r->width) < most * std::min(r->height, r->width) ? rectangle : strip;
+  }
+  return singular;
 }
 
 BoundedModes modes_of(Model model, const EigenOptions& options, int threads) {
@@ -64,28 +77,32 @@ std::optional<BoundedModes> finer(const Model& model, int steps, const EigenOpti
 }
 
 /// Bounds of `m` where `share` of its error, or more, is its change to the other mesh. The k-th frequency of one mesh
-/// and the k-th of another, in ascending order, approach the same limit. A change that is fifty times smaller than
-/// the largest is small by accident.
+/// and the k-th of another, in ascending order, approach the same limit; behind one that is not resolved they may not.
+/// A change that is fifty times smaller than the largest is small by accident.
 FrequencyBounds bounds_of(const ModalBasis& m, const ModalBasis& other, double share) {
   FrequencyBounds r{VectorXd::Constant(m.omega.size(), unknown), "from the next finer mesh"};
   const Index first = m.rigid_freedoms, n = std::min(m.omega.size(), other.omega.size()) - first;
   if (n <= 0) return r;
   const Eigen::ArrayXd change = (m.omega.segment(first, n).array() / other.omega.segment(first, n).array() - 1).abs();
-  for (Index k = 0; k < n; ++k)
-    if (change[k] < unresolved)
-      r.relative[first + k] = std::max(change[k], change.maxCoeff() / 50) / share + m.summary.residual_max + round_off;
+  const auto resolved = std::ranges::find_if_not(change, [](double c) { return c < unresolved; }) - change.begin();
+  if (resolved == 0) return r;
+  const double least = change.head(resolved).maxCoeff() / 50;
+  r.relative.segment(first, resolved) = change.head(resolved).max(least) / share + m.summary.residual_max + round_off;
   return r;
 }
 
 }  // namespace
 
-/// Edges along the boom are singular, and no mesh is refined toward them.
 double slowest_fall(const BodyScene& body) {
-  constexpr double smooth = 0.5, singular = 0.65;
+  constexpr double smooth = 0.5, singular = 0.7;
   if (body.structure != "solid") return smooth;
-  const bool edges = std::ranges::any_of(
-      body.geometry.segments, [](const BeamSegment& s) { return std::holds_alternative<RectangularTube>(s.start); });
-  return edges || body.solid.slit > 0 ? singular : smooth;
+  const auto& segments = body.geometry.segments;
+  const auto is_singular = [](const BeamSegment& s) { return std::holds_alternative<RectangularTube>(s.start); };
+  if (body.solid.slit > 0 || std::ranges::any_of(segments, is_singular)) return singular;
+  if (!follows_accuracy(body)) return smooth;
+  double slowest = 0;
+  for (const BeamSegment& s : segments) slowest = std::max({slowest, slowest_fall(s.start), slowest_fall(s.end)});
+  return slowest;
 }
 
 double FrequencyBounds::worst(int rigid_freedoms) const {
@@ -103,7 +120,7 @@ std::optional<bool> BoundedModes::met() const {
 }
 
 BoundedModes bounded_modes(Model model, const EigenOptions& options, int threads) {
-  const bool refine = follows_accuracy(model);
+  const bool refine = model.body && follows_accuracy(*model.body);
   BoundedModes here = modes_of(std::move(model), options, threads);
   here.bounds.relative = VectorXd::Constant(here.basis.omega.size(), unknown);
   here.bounds.how = "a mesh file has no finer mesh to be compared with";
