@@ -11,6 +11,7 @@ struct TransientBench {
   std::string scene;  // "sport", ...
   std::string method;
   double tolerance = 0;  // asked for
+  double reference = 0;  // the tolerance of the reference
   double seconds = 0;    // of the integration, the least of up to five within half a second
   double error = 0;      // largest of all outputs (max over time of the difference over max of the output)
   double hub_error = 0;  // of hub.rotation; NaN where there is none
@@ -22,10 +23,10 @@ struct TransientBench {
 
 /// Work against precision: every method on the scenes named (paths or built-in), or else on SPORT with 2 and with 8
 /// modes per boom, without damping, and tumbling, at tolerances 1e-2 to 1e-9. Reference of a scene: another method than
-/// the one judged, at 1e-11 (bdf, or adams where nothing is damped; for that one, exponential, or adams for scenes with
-/// joints). "ida" flies the formulation by multipliers. A method ends where its next tolerance would take longer than
-/// `longest` seconds. A scene that closes a loop has one method, which is its own reference. Calls `seen` after each
-/// row.
+/// the one judged (bdf, or adams where nothing is damped; for that one, exponential, or adams for scenes with joints),
+/// at 1e-11, or the next tolerance at which it does not fail. "ida" flies the formulation by multipliers. A method ends
+/// where its next tolerance would take longer than `longest` seconds, or comes near that of the reference. A scene that
+/// closes a loop has one method, which is its own reference. Calls `seen` after each row.
 std::vector<TransientBench> bench_transient(const std::vector<std::string>& scenes, double longest,
                                             const std::function<void(const TransientBench&)>& seen);
 

@@ -1068,8 +1068,21 @@ class Bench(Case):
         for row in rows:
             self.assertLess(row["error"], 0.2, row)  # of a coarse tolerance, just after a contact
             self.assertLess(row["hub_error"], 0.01, row)
+            self.assertEqual(row["reference_tolerance"], 1e-11)
         self.assertIn("exponential", (out / "bench_transient.csv").read_text())
         self.assertIn("<svg", (out / "bench_transient.svg").read_text())
+
+    def test_transient_of_a_closed_loop_has_the_reference_that_round_off_allows(self):
+        scene = self.folder / "short.toml"
+        scene.write_text((MESHES / "slider-crank.toml").read_text().replace("duration = 0.25", "duration = 0.02"))
+        result = flexboom("bench", "transient", scene, "--json", "--out", self.folder / "out")
+        self.assert_exit(OK, result)
+        rows = json.loads(result.stdout)
+        self.assertGreater(len(rows), 4)
+        for row in rows:
+            self.assertEqual(row["method"], "ida")
+            self.assertLess(row["error"], 30 * row["tolerance"], row)
+            self.assertGreater(row["tolerance"], 9 * row["reference_tolerance"], row)
 
     def test_transient_of_a_scene_with_joints(self):
         result = flexboom("bench", "transient", "two-link-arm", "--longest", "0.001", "--json", "--out", self.folder)
