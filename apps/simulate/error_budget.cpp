@@ -37,6 +37,11 @@ Scene with_stiffening(Scene scene) {
   return scene;
 }
 
+Scene with_a_digit_more(Scene scene) {
+  scene.integrator_tolerance = std::stod(fmt::format("{:.6g}", scene.step_tolerance() / 10));
+  return scene;
+}
+
 Scene as_flown(Scene scene, const Run& run) {
   for (BodyScene& b : scene.bodies) {
     const auto body = std::ranges::find(run.bodies, b.name, [](const PreparedBody& p) { return p.body.name; });
@@ -151,14 +156,6 @@ struct Measuring {
     return r;
   }
 };
-
-constexpr double least_tolerance = 1e-13;  // of a flight in comparison: below is round-off
-
-/// A digit more from the integrator: a number that people can read in the scene that is written.
-Scene with_a_digit_more(Scene scene) {
-  scene.integrator_tolerance = std::stod(fmt::format("{:.6g}", scene.step_tolerance() / 10));
-  return scene;
-}
 
 std::vector<OutputDifference> Repeats::change(const Run& run, const Scene& other, int refine) const {
   constexpr double counts = 1.0 / 3, beyond_doubt = 100;  // times the tolerance
@@ -283,7 +280,8 @@ std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const Ou
                                                 const RunHooks& hooks, std::vector<std::string>& plan) {
   for (double before = std::numeric_limits<double>::infinity();;) {
     const Scene tight = with_a_digit_more(flown);
-    Run finer = run_once(tight, hooks, 0, bearable_steps(run));
+    const bool is_kept = hooks.kept != nullptr && hooks.kept->scene == to_toml(tight);
+    Run finer = is_kept ? std::exchange(*hooks.kept, {}).run : run_once(tight, hooks, 0, bearable_steps(run));
     std::vector<OutputDifference> differences = compare_outputs(run.outputs, finer.outputs, flown.outputs, floors);
     const double error = largest(differences);
     if (!(error < std::exchange(before, error) / 5)) --asked.digits;

@@ -41,6 +41,12 @@ ErrorBudget measure_budget(Scene&, Run& run, const RunHooks&, std::vector<std::s
 /// The scene with the geometric stiffness that its run had: a repeat changes one thing alone.
 Scene as_flown(Scene, const Run&);
 
+/// Of the integrator of a flight in comparison: below is round-off.
+inline constexpr double least_tolerance = 1e-13;
+
+/// A digit more from its integrator: a number that people can read in the scene that is written.
+Scene with_a_digit_more(Scene);
+
 /// All geometric stiffness.
 Scene with_stiffening(Scene);
 

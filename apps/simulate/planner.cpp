@@ -163,8 +163,8 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
   }
   const auto run = [&](int candidates, long max_steps) {
     open = with_candidates(scene, candidates, candidates, hooks);
-    all = as_flown(open, few);
-    all.integrator_tolerance = std::max(scene.step_tolerance() / 10, 1e-13);  // its errors are no part of differences
+    all = with_a_digit_more(as_flown(open, few));  // errors of its time are no part of differences
+    all.integrator_tolerance = std::max(all.integrator_tolerance, least_tolerance);
     return run_once(all, hooks, 0, max_steps);
   };
   const long bearable = 2 * bearable_steps(few);  // of a tighter tolerance
@@ -229,10 +229,14 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
     return static_cast<size_t>(std::ranges::count_if(
         list, [&](const Candidate& c) { return c.displacement > share * list.front().displacement; }));
   };
+  const double bearable = scene.tolerance / 3;
   const auto error_with = [&](size_t count) {
     try {
-      const Run run = run_once(with_first(all, list, count), hooks, 0, bearable_steps(*reference));
-      return largest(compare_outputs(without_coordinates(run.outputs), wanted, scene.outputs, floors));
+      const Scene tried = with_first(all, list, count);
+      Run run = run_once(tried, hooks, 0, bearable_steps(*reference));
+      const double e = largest(compare_outputs(without_coordinates(run.outputs), wanted, scene.outputs, floors));
+      if (e <= bearable && hooks.kept != nullptr) *hooks.kept = {to_toml(tried), std::move(run)};
+      return e;
     } catch (const NumericalError&) {
       return unknown;
     }
@@ -245,7 +249,7 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
   // How many are enough where errors are in proportion to the displacement left out.
   const auto expected = [&](size_t tried, double tried_error) {
     size_t count = moved;
-    while (count > 0 && left_out(count - 1) * tried_error <= left_out(tried) * scene.tolerance / 3) --count;
+    while (count > 0 && left_out(count - 1) * tried_error <= left_out(tried) * bearable) --count;
     return count;
   };
   size_t enough = moved, too_few = std::min(too_few_, moved), next = moving_by(scene.tolerance / 10);
@@ -255,7 +259,7 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
   for (int i = 0; i < most_trials && !is_settled() && !hooks.stopped(); ++i) {
     const size_t count = std::min(next, enough - 1);
     const double e = error_with(count);
-    const bool is_enough = e <= scene.tolerance / 3;
+    const bool is_enough = e <= bearable;
     if (is_enough)
       enough = count, error = e;
     else

@@ -230,6 +230,8 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
   r.scene = given;
   validate(r.scene);
   r.scene = with_steady_motions(r.scene);
+  KeptFlight kept;
+  if (r.scene.error_budget) hooks.kept = &kept;
   Planner planner(r.scene);
   planner.choose(r.scene, hooks, r.plan);
   RunHooks of_run = hooks;
