@@ -1,8 +1,8 @@
 #include "dynamics/methods/exponential.hpp"
 
 #include "dynamics/methods/followers.hpp"
+#include "dynamics/methods/linear_parts.hpp"
 #include "dynamics/methods/stop_search.hpp"
-#include "dynamics/numerics/linear_part.hpp"
 #include "dynamics/numerics/small_product.hpp"
 #include "fem/base/check.hpp"
 
@@ -13,7 +13,6 @@
 #include <exception>
 #include <functional>
 #include <limits>
-#include <map>
 
 namespace flexboom {
 namespace {
@@ -25,7 +24,6 @@ using Eigen::VectorXd;
 
 constexpr int max_sweeps = 12;
 constexpr double rung = 1.4142135623730951;  // between step sizes
-constexpr double near_by = 0.3;              // joints this near to where L was taken hardly change it [rad] or [m]
 
 /// The nearest of the step sizes that grids are kept for.
 double on_ladder(double h) { return std::exp2(std::round(2 * std::log2(h)) / 2); }
@@ -34,6 +32,7 @@ class ExponentialStepper final : public Stepper {
  public:
   ExponentialStepper(std::unique_ptr<SplitProblem> problem, const ErrorScale& scale)
       : problem_(std::move(problem)),
+        parts_(*problem_),
         layout_(problem_->layout()),
         scale_(scale),
         nx_(layout_.x),
@@ -67,7 +66,8 @@ class ExponentialStepper final : public Stepper {
     pending_ = false;
     contact_.assign(contact.begin(), contact.end());
     levels_.assign(levels.begin(), levels.end());
-    step_.linear = &linear_part(y);
+    parts_.close(contact_);
+    step_.linear = &parts_.near(step_.start, y);
     begin(y);
     first_ = true;
     h_ = first_step();
@@ -140,7 +140,7 @@ class ExponentialStepper final : public Stepper {
       step_.linear->to_x(integral_, y.head(nx_));
       motion_.turn(step_, scratch_, 1, y);
       motion_.place(step_, 1, y);
-      if (y.allFinite() && serves(*step_.linear, y)) look(y);
+      if (y.allFinite() && parts_.serves(*step_.linear, y)) look(y);
     }
   }
 
@@ -165,101 +165,16 @@ class ExponentialStepper final : public Stepper {
 
   double fastest() const override { return step_.linear->fastest; }
 
-  StepCounts counts() const override { return counts_; }
+  StepCounts counts() const override {
+    StepCounts counts = counts_;
+    counts.jacobian_evaluations = counts.factorisations = parts_.made();
+    return counts;
+  }
 
  private:
   static constexpr int degree = collocation::degree;
   static constexpr int points = collocation::points;
   static constexpr int inner = points - 2;
-
-  /// The linear part for the stops that are closed, near the joints' coordinates of y: made when first met.
-  LinearPart& linear_part(const VectorXd& y) {
-    auto& place = linear_parts_[contact_];
-    if (!place || !serves(*place, y)) place = make_linear_part(base_at(y));
-    return *place;
-  }
-
-  /// At rest, undeformed, joints where they are; on their thresholds where they are near: what belongs to different
-  /// stops belongs to the same place then.
-  VectorXd base_at(const VectorXd& y) const {
-    VectorXd base = y;
-    base.head(nx_).setZero();
-    for (const int i : layout_.joints)
-      if (std::abs(y[i]) > near_by) base[i] = y[i];
-    for (const int i : layout_.spins) base[i] = y[i];
-    return base;
-  }
-
-  bool serves(const LinearPart& part, const VectorXd& y) const {
-    const auto far = [&](int i) { return !(std::abs(part.base[i] - y[i]) <= near_by); };
-    return std::ranges::none_of(layout_.joints, far) &&
-           std::ranges::none_of(layout_.turns, [&](const SplitLayout::Turn& turn) {
-             const auto here = y.segment<4>(turn.attitude), there = part.base.segment<4>(turn.attitude);
-             return layout_.attitudes_matter && 2 * std::acos(std::min(1.0, std::abs(here.dot(there)))) > near_by;
-           });
-  }
-
-  std::unique_ptr<LinearPart> make_linear_part(const VectorXd& base) {
-    ++counts_.jacobian_evaluations;
-    ++counts_.factorisations;
-    // A coordinate that nothing pulls back (a hinge without a spring) has no two eigenvectors of its own. With a period
-    // of two hours in L it has; the remainder takes the difference.
-    constexpr double pull = 1e-6;
-    const auto hold = [](MatrixXd& J, const SplitLayout::Coordinate& c) {
-      if (J.col(c.value).cwiseAbs().maxCoeff() < pull) J(c.rate, c.value) -= pull;
-    };
-    const auto [other, stop] = neighbour(base);
-    if (other != nullptr && base[layout_.gaps[stop].value] == 0) {
-      const SplitLayout::Coordinate& gap = layout_.gaps[stop];
-      const int column = gap.value;
-      MatrixXd J = other->L;
-      J.col(column) += (contact_[stop] ? 1 : -1) * pull_of(stop, base);
-      hold(J, gap);
-      try {
-        return std::make_unique<LinearPart>(*other, J, column);
-      } catch (const NumericalError&) {
-        // The block alone has no full set of eigenvectors, or two in one place; all of L may do.
-      }
-    }
-    MatrixXd J = problem_->linear(step_.start, base.data(), contact_);
-    if (const double largest = J.cwiseAbs().maxCoeff(); !(largest * largest < std::numeric_limits<double>::max()))
-      throw NumericalError(fmt::format(  // no other method could, so this is no failure of the method
-          "the Jacobian of the equations of motion has entries of {:.2g}, whose squares overflow", largest));
-    for (const int i : layout_.prescribed) J.row(i).setZero(), J.col(i).setZero();
-    for (const SplitLayout::Coordinate& c : layout_.coordinates) hold(J, c);
-    std::vector<int> omegas;
-    for (const SplitLayout::Turn& turn : layout_.turns) omegas.push_back(turn.omega);
-    try {
-      return std::make_unique<LinearPart>(J, omegas, base);
-    } catch (const NumericalError&) {  // several that are pulled by each other alone
-      for (const auto& [value, rate] : layout_.coordinates) J(rate, value) -= pull;
-      return std::make_unique<LinearPart>(J, omegas, base);
-    }
-  }
-
-  /// What a closed stop adds to L. On its threshold it has no force, and is in the column of its gap alone.
-  VectorXd pull_of(size_t stop, VectorXd base) {
-    constexpr double gap = 1e-6;  // small, and far from round-off
-    std::vector<char> contact = contact_;
-    const auto derivative = [&](bool closed) -> VectorXd {
-      contact[stop] = closed;
-      problem_->derivative(step_.start, base.data(), contact, y_dot_.data());
-      return y_dot_.head(nx_);
-    };
-    base[layout_.gaps[stop].value] = gap;
-    return (derivative(true) - derivative(false)) / gap;
-  }
-
-  /// A linear part at the same place that differs in one stop, and which.
-  std::pair<const LinearPart*, size_t> neighbour(const VectorXd& base) const {
-    for (const auto& [contact, part] : linear_parts_) {
-      if (!part || part->base.head(nx_) != base.head(nx_)) continue;
-      const auto [here, there] = std::ranges::mismatch(contact_, contact);
-      if (here != contact_.end() && std::equal(here + 1, contact_.end(), there + 1))
-        return {part.get(), static_cast<size_t>(here - contact_.begin())};
-    }
-    return {};
-  }
 
   /// Takes L where the step starts, unless it was taken near there: that costs as much as some steps.
   void relinearise(double near) {
@@ -268,8 +183,7 @@ class ExponentialStepper final : public Stepper {
     for (const SplitLayout::Turn& turn : layout_.turns) base.segment<3>(turn.omega).setZero();
     const auto there = step_.linear->base.head(nx_), here = base.head(nx_);
     if ((there - here).norm() <= near * std::max(there.norm(), here.norm())) return;
-    linear_parts_[contact_] = make_linear_part(base);
-    step_.linear = linear_parts_[contact_].get();
+    step_.linear = &parts_.renew(step_.start, base);
     begin(start_);
     first_ = true;
   }
@@ -462,13 +376,13 @@ class ExponentialStepper final : public Stepper {
   }
 
   std::unique_ptr<SplitProblem> problem_;
+  LinearParts parts_;
   const SplitLayout& layout_;
   const ErrorScale& scale_;
   int nx_;
   std::vector<char> contact_;
   std::vector<double> levels_;
   std::vector<int> watched_;  // entries of x that are wanted at every point: angular velocities, gaps and their rates
-  std::map<std::vector<char>, std::unique_ptr<LinearPart>> linear_parts_;
   CollocatedStep step_;
   Followers motion_;
   StopSearch search_;
