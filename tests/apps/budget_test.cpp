@@ -1,9 +1,8 @@
-// What the error budget says, and what it must not say; warnings of what a theory cannot hold.
+// What the error budget says, and what it must not say.
 
-#include "apps/commands/commands.hpp"
 #include "apps/results/results.hpp"
 #include "apps/simulate/error_budget.hpp"
-#include "reduction/body_file/body_file.hpp"
+#include "tests/apps/reduced_testing.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
 
@@ -20,27 +19,6 @@
 
 namespace flexboom {
 namespace {
-
-/// A scene with joints whose boom was reduced before; `change` makes the file's body another one.
-Scene with_reduced(const std::string& text, const std::function<void(ReducedBody&)>& change = {}) {
-  Scene scene = parse_scene(text, "reduced.toml");
-  BodyScene& boom = scene.bodies.at(0);
-  ReducedBody body = prepare_body(boom).body;
-  if (change) change(body);
-  const std::filesystem::path file =
-      std::filesystem::path(testing::TempDir()) / ("boom." + std::to_string(::getpid()) + ".h5");
-  write_body_file(file, body);
-  BodyScene reduced;
-  reduced.name = boom.name;
-  reduced.structure = body.structure;
-  reduced.modes = 0;
-  reduced.stiffening = "auto";
-  reduced.reduced = std::make_shared<const ReducedBody>(read_body_file(file));
-  reduced.reduced_file = file;
-  std::filesystem::remove(file);
-  boom = reduced;
-  return scene;
-}
 
 class Budget : public testing::TestWithParam<std::string> {
  protected:
@@ -277,55 +255,6 @@ TEST(BudgetOfAnyScene, OutlivesARepeatThatFails) {
   }
 }
 
-// --- momenta ---
-
-/// Drift of the momenta in a short flight of this scene.
-double drift(const std::string& text, const std::string& formulation = "relative") {
-  Scene scene = parse_scene(text, "drift.toml");
-  scene.formulation = formulation;
-  scene.error_budget = false;
-  scene.duration = 0.05;
-  return run_scene(scene, {}).trajectory.summary.momentum_drift;
-}
-
-TEST(MomentumDrift, IsUnknownWhereSomethingPushesOrHolds) {
-  for (const char* formulation : {"relative", "multipliers"}) {
-    EXPECT_LT(drift(swing_on_hinge, formulation), 1e-6);
-    EXPECT_LT(drift(swing_on_joints, formulation), 1e-6);
-    EXPECT_TRUE(std::isnan(drift(with(swing_on_hinge, "mass = 8.5", "mass = 8.5\nfixed = true"), formulation)));
-    for (const char* more :
-         {"drive = \"0.1*sin(t)\"\n", "[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\nforce = [1, 0, 0]\n",
-          "[[springs]]\nname = \"tether\"\na = { body = \"ground\", point = [1, 0, 0] }\nb = { body = \"hub\" }\n"
-          "stiffness = 1\n"})
-      EXPECT_TRUE(std::isnan(drift(swing_on_joints + more, formulation))) << more;
-    EXPECT_TRUE(std::isnan(
-        drift(with(swing_on_joints, "duration = 0.5", "duration = 0.5\ngravity = [0, 0, -1]"), formulation)));
-    EXPECT_TRUE(std::isnan(drift(with(swing_on_joints, "kind = \"free\"", "kind = \"spherical\""), formulation)));
-    for (const std::string& text : {swing_on_hinge, swing_on_joints})
-      EXPECT_TRUE(std::isnan(drift(text + "[orbit]\ngravity = \"differential\"\n", formulation))) << text;
-  }
-  EXPECT_LT(drift(swing_on_hinge + "[orbit]\naltitude = 4e5\n"), 1e-6);
-}
-
-// --- tips ---
-
-std::vector<std::string> outputs_of(const Scene& given) {
-  Scene scene = given;
-  scene.error_budget = false;
-  scene.duration = 0.02;
-  return run_scene(scene, {}).outputs.names;
-}
-
-/// The marker "tip" under another name.
-std::function<void(ReducedBody&)> called(const std::string& name) {
-  return [name](ReducedBody& body) {
-    for (Marker& m : body.markers)
-      if (m.name == "tip") m.name = name;
-    for (MarkerStiffness& m : body.Kg.markers)
-      if (m.marker == "tip") m.marker = name;
-  };
-}
-
 /// Two bases have other coordinates by the same names.
 TEST(Budget, CoordinatesOfOtherBasesAreNotCompared) {
   OutputTable table;
@@ -350,155 +279,6 @@ TEST(Budget, WhatSymmetryKeepsAtRestIsNoError) {
   EXPECT_LT(hub->total(), 1e-3);
   EXPECT_LT(r.budget.time, 1e-3);
   EXPECT_EQ(r.scene.integrator_tolerance, 0) << "no digit more helps";
-}
-
-TEST(Tip, IsFoundWhateverItsSpelling) {
-  const Scene plain = parse_scene(swing_on_joints, "plain.toml");
-  const std::vector<std::string> names = outputs_of(plain);
-  for (const char* name : {"tip", "TIP", "Tip", "END", "panel_edge"}) {
-    EXPECT_EQ(outputs_of(with_reduced(swing_on_joints, called(name))), names) << name;
-    Scene named = with_reduced(swing_on_joints, called(name));
-    named.outputs = {"boom.tip"};
-    EXPECT_NO_THROW(validate(named)) << name;
-  }
-  Scene a = plain, b = with_reduced(swing_on_joints, called("TIP"));
-  a.error_budget = b.error_budget = false;
-  const RunResult x = run_scene(a, {}), y = run_scene(b, {});
-  EXPECT_GT(column(x, "boom.tip.y").cwiseAbs().maxCoeff(), 0);
-  EXPECT_EQ(column(y, "boom.tip.y").cwiseAbs().maxCoeff(), column(x, "boom.tip.y").cwiseAbs().maxCoeff());
-}
-
-// Two places that move and none called tip: the column is not there, and the plan says why.
-TEST(Tip, IsAbsentWhereNoMarkerIsOne) {
-  Scene scene = with_reduced(swing_on_joints, [](ReducedBody& body) {
-    called("edge")(body);
-    Marker other = *std::ranges::find(body.markers, std::string("edge"), &Marker::name);
-    other.name = "corner";
-    body.markers.push_back(other);
-  });
-  scene.error_budget = false;
-  scene.duration = 0.02;
-  const RunResult r = run_scene(scene, {});
-  EXPECT_EQ(std::ranges::count(r.outputs.names, "boom.tip.y"), 0);
-  EXPECT_EQ(std::ranges::count(r.outputs.names, "boom.q1"), 1);
-  EXPECT_TRUE(any_has(r.plan, "no output boom.tip")) << fmt::format("{}", fmt::join(r.plan, "\n"));
-  scene.outputs = {"boom.tip"};
-  try {
-    validate(scene);
-    FAIL();
-  } catch (const InputError& e) {
-    EXPECT_NE(std::string(e.what()).find("no marker that is its tip"), std::string::npos) << e.what();
-  }
-}
-
-TEST(Tip, MarkersOfPlacesCompareWithoutCase) {
-  const Scene scene = parse_scene(with(swing_on_joints, "marker = \"root\"", "marker = \"ROOT\""), "case.toml");
-  EXPECT_EQ(scene.joints.back().b.marker, "root");
-}
-
-// --- warnings ---
-
-TEST_P(Budget, LargeDeflectionsAreNamed) {
-  for (const std::string& text : {swing_on_hinge, swing_on_joints}) {
-    const std::string soft = with(text, "E = 70e9", "E = 70e6");
-    Scene scene = parse_scene(soft, "soft.toml");
-    scene.error_budget = false;
-    scene.duration = 0.3;
-    if (scene.is_tree)
-      scene.joints.back().start_rate = {20};
-    else
-      scene.hinges[0].start_rate = 20;
-    const RunResult large = run(scene);
-    EXPECT_TRUE(any_has(large.warnings, "body boom: it bends by ")) << text;
-    EXPECT_TRUE(any_has(large.warnings, " m at t = "));
-    EXPECT_TRUE(any_has(large.warnings, "% of its length"));
-    Scene stiff = parse_scene(text, "stiff.toml");
-    stiff.error_budget = false;
-    stiff.duration = 0.1;
-    const RunResult small = run(stiff);
-    EXPECT_FALSE(any_has(small.warnings, "it bends by "));
-  }
-}
-
-/// A boom pressed along its axis beyond and below Euler's load, pi^2 E I / (4 L^2).
-TEST_P(Budget, BucklingIsNamed) {
-  const BodyScene boom = parse_scene(swing_on_joints, "boom.toml").bodies.at(0);
-  const BeamSegment& segment = boom.geometry.segments.at(0);
-  const double I = section_of(segment.start, segment.material.nu, boom.geometry.shear).Iz;
-  const double euler = std::pow(M_PI / (2 * segment.length), 2) * segment.material.E * I;
-  for (const double share : {0.5, 2.0}) {
-    Scene scene = parse_scene(
-        fmt::format("{}[[loads]]\nname = \"press\"\nat = {{ body = \"boom\", marker = \"tip\" }}\nforce = [{}, 0, 0]\n",
-                    swing_on_joints, -share * euler),
-        "pressed.toml");
-    scene.joints.back().kind = JointKind::fixed;
-    scene.joints.back().mechanism = {}, scene.joints.back().start.clear();
-    scene.joints.front().kind = JointKind::fixed;
-    scene.bodies[0].stiffening = "on";
-    scene.error_budget = false;
-    scene.duration = 0.01;
-    const RunResult r = run(scene);
-    EXPECT_EQ(any_has(r.warnings, "it buckles"), share > 1) << fmt::format("{}", fmt::join(r.warnings, "\n"));
-    EXPECT_EQ(any_has(r.warnings, "body boom: at t = "), share > 1);
-  }
-}
-
-TEST(Warnings, OfSpringsAndStartsBeyondTheStop) {
-  const std::string hinge = with(swing_on_hinge, "P3 = 0", "P3 = 20\nthreshold = 1.2");
-  EXPECT_TRUE(any_has(parse_scene(hinge, "x.toml").warnings, "hinge boom: starts at 1.5 rad, beyond the stop"));
-  EXPECT_TRUE(any_has(parse_scene(hinge, "x.toml").warnings, "hinge boom: the spring is at rest at 1.5708 rad"));
-  const std::string joint = swing_on_joints + "stop_stiffness = 10\nthreshold = 0.05\nrest = 0.06\n";
-  EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: starts at 0.07 rad, beyond the stop"));
-  EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: the spring is at rest at 0.06 rad"));
-  for (const std::string& text : {swing_on_hinge, swing_on_joints})
-    EXPECT_TRUE(parse_scene(text, "x.toml").warnings.empty());
-  for (const std::string& name : builtin_scene_names())
-    EXPECT_FALSE(any_has(load_scene(name).warnings, "beyond the stop")) << name;
-}
-
-// What a file says of itself is read where it is used.
-TEST(Warnings, OfABodyWhoseFileFailsItsOwnChecks) {
-  const auto failed = [](ReducedBody& body) { body.certificate = {{"mass", 1.0, 2.0, 0.5, false}}; };
-  const auto passed = [](ReducedBody& body) { body.certificate = {{"mass", 1.0, 1.0, 0.0, true}}; };
-  const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) / ("check." + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder);
-  for (const bool good : {true, false}) {
-    Scene scene = with_reduced(swing_on_joints, good ? std::function<void(ReducedBody&)>(passed) : failed);
-    scene.bodies[0].reduced_file = folder / "boom.h5";
-    write_body_file(scene.bodies[0].reduced_file, *scene.bodies[0].reduced);
-    std::ofstream(folder / "scene.toml") << to_toml(scene);
-    CommonOptions quiet;
-    quiet.quiet = true;
-    EXPECT_EQ(check_command((folder / "scene.toml").string(), quiet), good ? exit_ok : exit_check_failed);
-    EXPECT_EQ(any_has(read_scene(folder / "scene.toml").warnings, "fails its own check \"mass\""), !good);
-  }
-  std::filesystem::remove_all(folder);
-}
-
-// A function of time that has no value names itself, wherever it is and whoever asks.
-TEST(FunctionOfTime, WithoutAValueIsNamed) {
-  const struct {
-    const char *more, *words;
-  } cases[] = {
-      {"drive = \"log(0.01 - t)\"\n", "joint hinge: drive is "},
-      {"motion = \"log(0.01 - t)\"\n", "joint hinge: motion is "},
-      {"[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\nforce = [0, \"sqrt(0.01 - t)\", 0]\n",
-       "load push: force[1] is "},
-      {"[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\ntorque = [0, 0, \"1/(t - 0.01) + log(0.01 - t)\"]\n",
-       "load push: torque[2] is "},
-      {"[[wheels]]\nname = \"spin\"\nbody = \"hub\"\ninertia = 1e-3\ntorque = \"log(0.01 - t)\"\n",
-       "wheel spin: torque is "},
-  };
-  const std::string without_start = with(swing_on_joints, "start = 0.07\n", "");  // a motion has its own
-  for (const char* formulation : {"relative", "multipliers"})
-    for (const auto& c : cases) try {
-        drift(without_start + c.more, formulation);
-        ADD_FAILURE() << c.more;
-      } catch (const NumericalError& e) {
-        EXPECT_NE(std::string(e.what()).find(c.words), std::string::npos) << formulation << ": " << e.what();
-        EXPECT_NE(std::string(e.what()).find("at t = 0.01"), std::string::npos) << e.what();
-      }
 }
 
 // What is 1e-4 of a panel's stiffness makes its phase drift by 6e-3 in a minute, where nothing damps it: without a

@@ -1,0 +1,124 @@
+// What a run says of its motion: momenta, tips, functions of time that have no value.
+
+#include "tests/apps/reduced_testing.hpp"
+#include "tests/apps/run_testing.hpp"
+#include "tests/apps/scene_testing.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+namespace {
+
+/// Drift of the momenta in a short flight of this scene.
+double drift(const std::string& text, const std::string& formulation = "relative") {
+  Scene scene = parse_scene(text, "drift.toml");
+  scene.formulation = formulation;
+  scene.error_budget = false;
+  scene.duration = 0.05;
+  return run_scene(scene, {}).trajectory.summary.momentum_drift;
+}
+
+TEST(MomentumDrift, IsUnknownWhereSomethingPushesOrHolds) {
+  for (const char* formulation : {"relative", "multipliers"}) {
+    EXPECT_LT(drift(swing_on_hinge, formulation), 1e-6);
+    EXPECT_LT(drift(swing_on_joints, formulation), 1e-6);
+    EXPECT_TRUE(std::isnan(drift(with(swing_on_hinge, "mass = 8.5", "mass = 8.5\nfixed = true"), formulation)));
+    for (const char* more :
+         {"drive = \"0.1*sin(t)\"\n", "[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\nforce = [1, 0, 0]\n",
+          "[[springs]]\nname = \"tether\"\na = { body = \"ground\", point = [1, 0, 0] }\nb = { body = \"hub\" }\n"
+          "stiffness = 1\n"})
+      EXPECT_TRUE(std::isnan(drift(swing_on_joints + more, formulation))) << more;
+    EXPECT_TRUE(std::isnan(
+        drift(with(swing_on_joints, "duration = 0.5", "duration = 0.5\ngravity = [0, 0, -1]"), formulation)));
+    EXPECT_TRUE(std::isnan(drift(with(swing_on_joints, "kind = \"free\"", "kind = \"spherical\""), formulation)));
+    for (const std::string& text : {swing_on_hinge, swing_on_joints})
+      EXPECT_TRUE(std::isnan(drift(text + "[orbit]\ngravity = \"differential\"\n", formulation))) << text;
+  }
+  EXPECT_LT(drift(swing_on_hinge + "[orbit]\naltitude = 4e5\n"), 1e-6);
+}
+
+std::vector<std::string> names_of_outputs(const Scene& given) {
+  Scene scene = given;
+  scene.error_budget = false;
+  scene.duration = 0.02;
+  return run_scene(scene, {}).outputs.names;
+}
+
+TEST(Tip, IsFoundWhateverItsSpelling) {
+  const Scene plain = parse_scene(swing_on_joints, "plain.toml");
+  const std::vector<std::string> names = names_of_outputs(plain);
+  for (const char* name : {"tip", "TIP", "Tip", "END", "panel_edge"}) {
+    EXPECT_EQ(names_of_outputs(with_reduced(swing_on_joints, called(name))), names) << name;
+    Scene named = with_reduced(swing_on_joints, called(name));
+    named.outputs = {"boom.tip"};
+    EXPECT_NO_THROW(validate(named)) << name;
+  }
+  Scene a = plain, b = with_reduced(swing_on_joints, called("TIP"));
+  a.error_budget = b.error_budget = false;
+  const RunResult x = run_scene(a, {}), y = run_scene(b, {});
+  EXPECT_GT(column(x, "boom.tip.y").cwiseAbs().maxCoeff(), 0);
+  EXPECT_EQ(column(y, "boom.tip.y").cwiseAbs().maxCoeff(), column(x, "boom.tip.y").cwiseAbs().maxCoeff());
+}
+
+// Two places that move and none called tip: the column is not there, and the plan says why.
+TEST(Tip, IsAbsentWhereNoMarkerIsOne) {
+  Scene scene = with_reduced(swing_on_joints, [](ReducedBody& body) {
+    called("edge")(body);
+    Marker other = *std::ranges::find(body.markers, std::string("edge"), &Marker::name);
+    other.name = "corner";
+    body.markers.push_back(other);
+  });
+  scene.error_budget = false;
+  scene.duration = 0.02;
+  const RunResult r = run_scene(scene, {});
+  EXPECT_EQ(std::ranges::count(r.outputs.names, "boom.tip.y"), 0);
+  EXPECT_EQ(std::ranges::count(r.outputs.names, "boom.q1"), 1);
+  EXPECT_TRUE(any_has(r.plan, "no output boom.tip")) << fmt::format("{}", fmt::join(r.plan, "\n"));
+  scene.outputs = {"boom.tip"};
+  try {
+    validate(scene);
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("no marker that is its tip"), std::string::npos) << e.what();
+  }
+}
+
+TEST(Tip, MarkersOfPlacesCompareWithoutCase) {
+  const Scene scene = parse_scene(with(swing_on_joints, "marker = \"root\"", "marker = \"ROOT\""), "case.toml");
+  EXPECT_EQ(scene.joints.back().b.marker, "root");
+}
+
+// A function of time that has no value names itself, wherever it is and whoever asks.
+TEST(FunctionOfTime, WithoutAValueIsNamed) {
+  const struct {
+    const char *more, *words;
+  } cases[] = {
+      {"drive = \"log(0.01 - t)\"\n", "joint hinge: drive is "},
+      {"motion = \"log(0.01 - t)\"\n", "joint hinge: motion is "},
+      {"[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\nforce = [0, \"sqrt(0.01 - t)\", 0]\n",
+       "load push: force[1] is "},
+      {"[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\ntorque = [0, 0, \"1/(t - 0.01) + log(0.01 - t)\"]\n",
+       "load push: torque[2] is "},
+      {"[[wheels]]\nname = \"spin\"\nbody = \"hub\"\ninertia = 1e-3\ntorque = \"log(0.01 - t)\"\n",
+       "wheel spin: torque is "},
+  };
+  const std::string without_start = with(swing_on_joints, "start = 0.07\n", "");  // a motion has its own
+  for (const char* formulation : {"relative", "multipliers"})
+    for (const auto& c : cases) try {
+        drift(without_start + c.more, formulation);
+        ADD_FAILURE() << c.more;
+      } catch (const NumericalError& e) {
+        EXPECT_NE(std::string(e.what()).find(c.words), std::string::npos) << formulation << ": " << e.what();
+        EXPECT_NE(std::string(e.what()).find("at t = 0.01"), std::string::npos) << e.what();
+      }
+}
+
+}  // namespace
+}  // namespace flexboom
