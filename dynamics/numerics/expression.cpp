@@ -3,6 +3,7 @@
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <muParserBase.h>
 
 #include <algorithm>
@@ -203,6 +204,8 @@ std::string suggestion(const std::string& token) {
   const std::vector<std::string> known = expression_names();
   const auto near = std::ranges::min_element(
       known, {}, [&](const std::string& k) { return 2 * distance(name, k) + (k[0] != name[0]); });
+  if (2 * distance(name, *near) > name.size() + 2)  // it is another word
+    return fmt::format("; '{}' is not known; there are {}", name, fmt::join(known, ", "));
   return fmt::format("; '{}' is not known, the nearest name is '{}'", name, *near);
 }
 

@@ -88,6 +88,8 @@ TEST(Expression, SaysWhereAndWhatWasNotUnderstood) {
   EXPECT_EQ(why("2*sni(t)"),
             "expression \"2*sni(t)\", column 3: 'sni' is not understood; 'sni' is not known, the "
             "nearest name is 'sin'");
+  EXPECT_NE(why("heaviside(t)").find("'heaviside' is not known; there are t, pi, e, sin, "), std::string::npos)
+      << why("heaviside(t)");
   for (const char* bad : {"",          " ",     "1+",   "(1", "1)",  "sin()", "sin(1,2)", "1,2", "t=3", "2 3",
                           "t ? 1 : 2", "\"a\"", "1..2", "*2", "nan", "inf",   "sin",      "#",   "T",   "if(1,2)"}) {
     const std::string text = why(bad);
