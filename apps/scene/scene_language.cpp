@@ -277,7 +277,8 @@ void wheel_keys(Archive& a, WheelScene& w) {
   a.key({"name", "", "of the reaction wheel", required}, w.name, name);
   a.key({"body", "", "that carries it", required}, w.body);
   a.key({"axis", "", "unit vector, axes of the body"}, w.axis, direction);
-  a.key({"inertia", "kg m^2", "of the rotor about its axis", required}, w.inertia, positive);
+  a.key({"inertia", "kg m^2", "of the rotor about its axis: no part of that of the body", required}, w.inertia,
+        positive);
   a.key({"spin", "rad/s", "at t = 0, relative to the body"}, w.spin, finite);
   a.key({"torque", "N m", "on the rotor, function of time"}, w.torque);
   if (a.reader()) w.axis = unit_direction(w.axis);

@@ -122,7 +122,9 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
         : b.structure == "solid"
             ? fmt::format("{} solid elements, {} unknowns", p.elements, p.dofs)
             : fmt::format("{} beam elements, order {}, {} unknowns", p.elements, b.geometry.order, p.dofs);
-    plan.push_back(fmt::format("{}: {}; {} modes", b.name, model, p.body.n()));
+    const int modes = p.coordinates_of_modes(), others = p.body.n() - modes;
+    plan.push_back(fmt::format("{}: {}; {} modes{}", b.name, model, modes,
+                               others > 0 ? fmt::format(" and {} static shapes", others) : ""));
     plan.push_back(fmt::format("{}: {}", b.name, damping_text(b.damping)));
   }
   for (const JointScene& j : scene.joints)

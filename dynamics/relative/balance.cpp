@@ -76,7 +76,7 @@ Balance Tree::balance(double t, const Eigen::Ref<const VectorXd>& y, TreeWorkspa
     b.ledger.springs += 0.5 * spring.stiffness * stretch * stretch;
   }
   b.elastic = b.ledger.stored();
-  b.potential = -impl_->scene.gravity.dot(eigen(all.first_moment) + all.m * eigen(near.position));
+  b.potential = 0 - impl_->scene.gravity.dot(eigen(all.first_moment) + all.m * eigen(near.position));
   b.ledger.elsewhere = y[impl_->layout.dissipated_elsewhere];
   for (const TreeLayout::Joint& joint : impl_->layout.joints) {
     b.dissipated_by_joint.push_back(y[joint.dissipated]);
