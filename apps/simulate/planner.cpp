@@ -53,6 +53,11 @@ std::string counted(const std::vector<std::string>& kinds) {
   return parts.empty() ? "none" : fmt::format("{}", fmt::join(parts, ", "));
 }
 
+/// By multipliers a flight with many modes takes minutes. What modes do is the same by relative coordinates.
+bool is_costly_by_its_formulation(const Scene& scene) {
+  return scene.formulation == "multipliers" && std::ranges::none_of(scene.joints, &JointScene::closes_loop);
+}
+
 }  // namespace
 
 Planner::Planner(const Scene& scene) {
@@ -165,6 +170,10 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
     open = with_candidates(scene, candidates, candidates, hooks);
     all = with_a_digit_more(as_flown(open, few));  // errors of its time are no part of differences
     all.integrator_tolerance = std::max(all.integrator_tolerance, least_tolerance);
+    if (is_costly_by_its_formulation(all)) {
+      all.formulation = "relative", all.integrator = "auto";
+      all.integrator_tolerance = std::max(all.tolerance / 10, least_tolerance);
+    }
     return run_once(all, hooks, 0, max_steps);
   };
   const long bearable = 2 * bearable_steps(few);  // of a tighter tolerance

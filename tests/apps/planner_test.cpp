@@ -164,6 +164,17 @@ TEST(Planner, ThePlanIsPartOfTheSceneThatWasRun) {
   EXPECT_GT(r.budget.time, 0);
 }
 
+TEST(Planner, TheFormulationChangesNoChoice) {
+  Scene scene = spun_about("z", 1e-3);
+  scene.error_budget = false;
+  const RunResult relative = run_scene(scene, {});
+  scene.formulation = "multipliers";
+  const RunResult by_multipliers = run_scene(scene, {});
+  EXPECT_EQ(by_multipliers.scene.formulation, "multipliers");
+  EXPECT_EQ(by_multipliers.trajectory.summary.method, "ida");
+  EXPECT_EQ(by_multipliers.scene.bodies[1].shapes, relative.scene.bodies[1].shapes);
+}
+
 TEST(Planner, PlansWhatSaysNothingOfModes) {
   std::string text = to_toml(spun_about("z", 1e-3));
   const std::string key = "modes = \"auto\"";
