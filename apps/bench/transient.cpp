@@ -11,6 +11,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <utility>
 
 namespace flexboom {
 namespace {
@@ -96,29 +97,37 @@ class TransientLadder {
   struct Reference {
     OutputTable outputs;
     double tolerance = 0;
+    std::string failure{};  // why there is none
   };
 
   /// By the tightest tolerance from 1e-11 on that does not drown in round-off.
   static Reference fly_tightly(const Case& c, const std::string& method) {
     constexpr double tightest = 1e-11, tight = 1e-8;
-    const Run run = fly(c, method, tight);
-    for (double tolerance = tightest; tolerance < tight / 5; tolerance *= 10) {
-      try {
-        return {fly(c, method, tolerance, bearable_steps(run)).outputs, tolerance};
-      } catch (const NumericalError&) {  // the next one may do
+    try {
+      const Run run = fly(c, method, tight);
+      for (double tolerance = tightest; tolerance < tight / 5; tolerance *= 10) {
+        try {
+          return {fly(c, method, tolerance, bearable_steps(run)).outputs, tolerance};
+        } catch (const NumericalError&) {  // the next one may do
+        }
       }
+      return {run.outputs, tight};
+    } catch (const NumericalError& e) {
+      return {.outputs = {}, .failure = e.what()};
     }
-    return {run.outputs, tight};
   }
 
+  /// By a method that is not judged, where there is another that does not fail. @throws NumericalError.
   const Reference& reference(const Case& c, const std::string& judged) {
-    const std::vector<std::string> methods = methods_of(c.scene);
-    // The method that is judged is no reference of its own, where there is another.
-    const std::string& other = methods.front() == c.reference && methods.size() > 1 ? methods[1] : methods.front();
-    const std::string& method = methods.size() > 1 && judged != c.reference ? c.reference : other;
-    const auto [place, is_new] = references_.try_emplace(method);
-    if (is_new) place->second = fly_tightly(c, method);
-    return place->second;
+    std::vector<std::string> methods = methods_of(c.scene);
+    std::stable_partition(methods.begin(), methods.end(), [&](const std::string& m) { return m == c.reference; });
+    if (methods.size() > 1) std::erase(methods, judged);
+    for (const std::string& method : methods) {
+      const auto [place, is_new] = references_.try_emplace(method);
+      if (is_new) place->second = fly_tightly(c, method);
+      if (place->second.failure.empty()) return place->second;
+    }
+    throw NumericalError("there is no reference: " + references_.at(methods.front()).failure);
   }
 
   TransientBench measured(const Case& c, const std::string& method, double tolerance) {
@@ -128,8 +137,9 @@ class TransientLadder {
     row.tolerance = tolerance;
     row.simulated = c.scene.duration;
     try {
-      const auto& [exact, reference_tolerance] = reference(c, method);
-      row.reference = reference_tolerance;
+      const Reference& other = reference(c, method);
+      const OutputTable& exact = other.outputs;
+      row.reference = other.tolerance;
       row.seconds = std::numeric_limits<double>::infinity();
       const Stopwatch all;
       Run r;
