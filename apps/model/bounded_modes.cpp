@@ -19,9 +19,10 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double unresolved = 0.1;   // change of a frequency
-constexpr double round_off = 1e-12;  // of a frequency by any mesh
-constexpr int most_steps = 3;        // to finer meshes
+constexpr double unresolved = 0.1;                       // change of a frequency
+constexpr double round_off = 1e-12;                      // of a frequency by any mesh
+constexpr int most_steps = 3;                            // to finer meshes
+constexpr double usual_fall = 0.5, singular_fall = 0.7;  // of errors, to the next mesh
 
 bool is_solid(const Model& model) { return model.body && model.body->structure == "solid"; }
 
@@ -34,17 +35,17 @@ bool follows_accuracy(const BodyScene& body) {
          g.factor == 0;
 }
 
-/// Of errors of the program's own meshes of one section. Its edges along the boom are singular where they are
-/// re-entrant, and no mesh is refined toward them.
-double slowest_fall(const SectionShape& section) {
-  constexpr double round_bar = 0.25, tube = 0.4, rectangle = 0.35, strip = 0.5, singular = 0.7;
-  if (std::holds_alternative<RoundBar>(section)) return round_bar;
-  if (std::holds_alternative<Tube>(section)) return tube;
-  if (const auto* r = std::get_if<Rectangle>(&section)) {
-    constexpr double most = 4;  // width by height of one that is no strip
-    return std::max(r->height, r->width) < most * std::min(r->height, r->width) ? rectangle : strip;
-  }
-  return singular;
+/// Of errors of one section's meshes; `own`: of the program's choice. Re-entrant edges along the boom are singular, and
+/// no mesh is refined toward them.
+double slowest_fall(const SectionShape& section, bool own) {
+  constexpr double round_bar = 0.25, tube = 0.4, rectangle = 0.35;
+  if (std::holds_alternative<RectangularTube>(section)) return singular_fall;
+  if (own && std::holds_alternative<RoundBar>(section)) return round_bar;
+  if (own && std::holds_alternative<Tube>(section)) return tube;
+  constexpr double strip = 4;  // width by height
+  const auto* r = std::get_if<Rectangle>(&section);
+  const bool is_compact = r != nullptr && std::max(r->height, r->width) < strip * std::min(r->height, r->width);
+  return own && is_compact ? rectangle : usual_fall;
 }
 
 BoundedModes modes_of(Model model, const EigenOptions& options, int threads) {
@@ -94,14 +95,12 @@ FrequencyBounds bounds_of(const ModalBasis& m, const ModalBasis& other, double s
 }  // namespace
 
 double slowest_fall(const BodyScene& body) {
-  constexpr double smooth = 0.5, singular = 0.7;
-  if (body.structure != "solid") return smooth;
-  const auto& segments = body.geometry.segments;
-  const auto is_singular = [](const BeamSegment& s) { return std::holds_alternative<RectangularTube>(s.start); };
-  if (body.solid.slit > 0 || std::ranges::any_of(segments, is_singular)) return singular;
-  if (!follows_accuracy(body)) return smooth;
+  if (body.structure != "solid") return usual_fall;
+  if (body.solid.slit > 0) return singular_fall;
+  const bool own = follows_accuracy(body);
   double slowest = 0;
-  for (const BeamSegment& s : segments) slowest = std::max({slowest, slowest_fall(s.start), slowest_fall(s.end)});
+  for (const BeamSegment& s : body.geometry.segments)
+    slowest = std::max({slowest, slowest_fall(s.start, own), slowest_fall(s.end, own)});
   return slowest;
 }
 
