@@ -17,7 +17,7 @@
 
 namespace flexboom {
 
-long bearable_steps(const Run& run) { return 20 * run.motion.summary.steps + 10000; }
+long bearable_steps(const Run& run) { return 20 * run.motion.summary.steps + 20000; }
 
 OutputTable without_coordinates(const OutputTable& table) {
   OutputTable r;

@@ -2,6 +2,7 @@
 
 #include "dynamics/methods/followers.hpp"
 #include "dynamics/methods/linear_parts.hpp"
+#include "dynamics/methods/renewal.hpp"
 #include "dynamics/methods/stop_search.hpp"
 #include "dynamics/numerics/small_product.hpp"
 #include "fem/base/check.hpp"
@@ -38,6 +39,7 @@ class ExponentialStepper final : public Stepper {
         nx_(layout_.x),
         motion_(*problem_, scale),
         search_(layout_.gaps),
+        renewal_(nx_),
         y_(VectorXd::Zero(layout_.size)),
         y_dot_(layout_.size),
         F_(nx_, points),
@@ -72,11 +74,13 @@ class ExponentialStepper final : public Stepper {
     first_ = true;
     h_ = first_step();
     if (step_.linear->step > 0) h_ = std::min(h_, step_.linear->step);
+    renewal_.restart(counts_.steps, counts_.rhs_evaluations, t);
   }
 
   void step(double t_end, double& t, VectorXd& y, std::span<int> crossed) override {
     std::ranges::fill(crossed, 0);
     if (pending_) advance_start();
+    if (renewal_.is_due(counts_.steps, counts_.rhs_evaluations, step_.start)) relinearise(0);
     std::exception_ptr unfit;
     for (int failures = 0;; ++failures) {
       const double left = t_end - step_.start;
@@ -103,8 +107,7 @@ class ExponentialStepper final : public Stepper {
                         "round-off may be more than the tolerance: fewer modes, or a coarser one",
                         step_.start, step_.linear->lambda.cwiseAbs().maxCoeff()));
       }
-      h_ = std::isfinite(error) ? smaller(error) : on_ladder(step_.length / (rung * rung));
-      if (!std::isfinite(error)) relinearise(failures < 6 ? 1e-3 : 1e-9);
+      shorten(error, failures);
     }
     end_ = search_.first_crossing(step_, contact_, levels_, crossed);
     if (end_ == 0) {
@@ -176,14 +179,27 @@ class ExponentialStepper final : public Stepper {
   static constexpr int points = collocation::points;
   static constexpr int inner = points - 2;
 
+  /// After a step that failed.
+  void shorten(double error, int failures) {
+    constexpr int many = 6;
+    const bool diverges = !std::isfinite(error), is_fresh = renewal_.is_fresh(counts_.steps);
+    h_ = diverges ? on_ladder(step_.length / (rung * rung)) : smaller(error);
+    if (diverges && is_fresh && failures < many)
+      longest_ = on_ladder(step_.length / rung), since_longest_ = 0;
+    else if (diverges)
+      relinearise(failures < many ? 1e-3 : 1e-9);
+    else if (failures >= 2 && !first_ && !is_fresh)  // what is stiff and not in L keeps the error from falling
+      relinearise(0);
+  }
+
   /// Takes L where the step starts, unless it was taken near there: that costs as much as some steps.
   void relinearise(double near) {
     VectorXd base = start_;
     for (const auto& [value, rate] : layout_.coordinates) base[rate] = 0;
-    for (const SplitLayout::Turn& turn : layout_.turns) base.segment<3>(turn.omega).setZero();
     const auto there = step_.linear->base.head(nx_), here = base.head(nx_);
-    if ((there - here).norm() <= near * std::max(there.norm(), here.norm())) return;
+    if (near > 0 && (there - here).norm() <= near * std::max(there.norm(), here.norm())) return;
     step_.linear = &parts_.renew(step_.start, base);
+    renewal_.taken(counts_.steps);
     begin(start_);
     first_ = true;
   }
@@ -366,6 +382,9 @@ class ExponentialStepper final : public Stepper {
     const double growth = std::pow(std::max(error, 1e-10), -1.0 / (degree + 1));
     // Half of what the error allows, up to four times: after a stop the first steps follow what decays at once.
     if (growth > 1.25 * rung) h_ = on_ladder(step_.length * std::clamp(growth / 2, rung, 4.0));
+    constexpr int patience = 20;  // steps until one that diverged is tried again
+    if (++since_longest_ > patience) longest_ *= rung, since_longest_ = 0;
+    h_ = std::min(h_, longest_);
     // What the next restart with these stops tries: a failed step costs less than many short ones.
     if (first_) step_.linear->step = error < 1e-3 ? 8 * step_.length : step_.length;
   }
@@ -386,9 +405,12 @@ class ExponentialStepper final : public Stepper {
   CollocatedStep step_;
   Followers motion_;
   StopSearch search_;
+  Renewal renewal_;
   Grid spare_;
   GridPoint scratch_;
 
+  double longest_ = std::numeric_limits<double>::infinity();  // step that does not diverge, as far as is known
+  int since_longest_ = 0;                                     // steps
   double h_ = 0, end_ = 1, last_used_ = 0, reached_ = 0, contraction_ = 0.1;
   bool first_ = true, pending_ = false;
   VectorXd start_, reached_state_;

@@ -16,10 +16,8 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double near_by = 0.3;  // joints this near to where L was taken hardly change it [rad] or [m]
-constexpr double pull = 1e-6;    // [1/s^2]
+constexpr double pull = held * held;
 
-/// A coordinate that nothing pulls back (a hinge without a spring) has no two eigenvectors of its own. With a period of
-/// two hours in L it has; the remainder takes the difference.
 void hold(MatrixXd& J, const SplitLayout::Coordinate& c) {
   if (J.col(c.value).cwiseAbs().maxCoeff() < pull) J(c.rate, c.value) -= pull;
 }

@@ -12,6 +12,10 @@
 
 namespace flexboom {
 
+/// A coordinate that nothing pulls back (a hinge without a spring) has no two eigenvectors of its own. In L it vibrates
+/// at this angular frequency [rad/s]; the remainder takes the difference.
+inline constexpr double held = 1e-3;
+
 /// The linear parts L of x' = L x + N of a flight: one for each set of closed stops, taken at rest near where the
 /// joints are, and kept.
 class LinearParts {

@@ -3,6 +3,7 @@
 #include "dynamics/events/conservation.hpp"
 #include "dynamics/events/event_loop.hpp"
 #include "dynamics/methods/error_scales.hpp"
+#include "dynamics/methods/linear_parts.hpp"
 #include "dynamics/methods/ode.hpp"
 #include "dynamics/relative/split.hpp"
 #include "fem/base/check.hpp"
@@ -30,37 +31,30 @@ std::vector<Stop> stops_of(const Tree& tree) {
   return stops;
 }
 
-/// Does exponential collocation suit a flight? By how long its steps become beside the fastest linear motion, in its
-/// first steps.
+/// Does exponential collocation suit a flight? Not where few bodies tumble free of all that acts and pulls.
 class Pilot {
  public:
-  /// After a step. @throws Unsuitable.
-  void observe(double step, double fastest) {
-    if (suits_) return;
-    turned_ = std::max(turned_, step * fastest), fastest_ = fastest;
-    suits_ = turned_ >= enough;
-    if (!suits_ && ++steps_ == steps) throw Unsuitable{fastest};
+  Pilot(const Tree& tree, double duration)
+      : duration_(duration), is_small_(tree.layout().p + tree.layout().u <= small && is_isolated(tree.scene())) {}
+
+  /// Before the first step. @throws Unsuitable.
+  void observe(double fastest) {
+    fastest_ = fastest;
+    constexpr double round_off = 1e-6;  // of an eigenvalue
+    if (is_small_ && fastest < std::max(1 / duration_, (1 + round_off) * held)) throw Unsuitable();
   }
-  std::string why() const {
-    return suits_ ? fmt::format("its steps pass {:.2g} rad of the fastest motion, {:.3g} rad/s", turned_, fastest_)
-                  : "the flight takes few steps";
-  }
+  std::string why() const { return fmt::format("linear motions reach {:.3g} rad/s", fastest_); }
 
   /// No failure: nothing of the flight is kept.
   struct Unsuitable {
-    double fastest;  // [rad/s]
-    std::string why() const {
-      return fmt::format("what is nonlinear sets the steps: no linear motion is faster than {:.2g} rad/s", fastest);
-    }
+    static constexpr const char* why = "all that moves is nonlinear";
   };
 
  private:
-  static constexpr int steps = 50;
-  static constexpr double enough =
-      0.1;  // of a radian: shorter steps are those of any method, and others do less in one
-  int steps_ = 0;
-  double turned_ = 0, fastest_ = 0;
-  bool suits_ = false;
+  static constexpr int small = 12;  // coordinates and rates: explicit steps are cheaper
+  double duration_;
+  bool is_small_;
+  double fastest_ = 0;  // [rad/s]
 };
 
 class TreeFlight final : public Flight<TreeTrajectory> {
@@ -186,11 +180,11 @@ class TreeFlight final : public Flight<TreeTrajectory> {
       scales_.restart(y_);
     }
     stepper_->restart(t_, y_, flags_, levels_);
+    if (starts && pilot_ != nullptr) pilot_->observe(stepper_->fastest());
     if (starts) stepper_->predict(options_.duration, [this](const VectorXd& y) { scales_.predict(y); });
   }
   void step(double limit, double& t, VectorXd& y) override {
     stepper_->step(limit, t, y, crossed_);
-    if (pilot_ != nullptr) pilot_->observe(t - t_, stepper_->fastest());
     const auto stops = static_cast<std::ptrdiff_t>(contacts_.size());
     std::copy(crossed_.begin(), crossed_.begin() + stops, contacts_.crossed().begin());
     std::copy(crossed_.begin() + stops, crossed_.end(), laws_.crossed().begin());
@@ -340,13 +334,12 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   if (o.method != "auto") return fly(o.method, "");
   if (has_laws) return fly("bdf", "joints have laws");
   try {
-    Pilot pilot;
+    Pilot pilot(tree, o.duration - o.start);
     TreeTrajectory r = TreeFlight(tree, start, o, integrator_method("exponential"), so_far, look, &pilot).fly();
     r.summary.why_method = pilot.why();
     return r;
   } catch (const Pilot::Unsuitable& reason) {
-    const bool cheap = tree.layout().p + tree.layout().u <= 12;  // less than what a multistep method does beside it
-    return fly(cheap ? "erk" : "adams", reason.why());
+    return fly("erk", reason.why);
   } catch (const MethodFailure& failure) {
     return fly("bdf", fmt::format("exponential collocation could not: {}", failure.what()));
   } catch (const InputError& failure) {

@@ -75,7 +75,7 @@ TEST(TreeFlight, TheMethodSuitsTheScene) {
   bent.joints[0].coordinate = {0.3}, bent.joints[1].coordinate = {0.5};
   const TreeTrajectory stiff = integrate(arm, arm.pack(bent), tree_options("auto", 1e-6, 0.5, 0.02));
   EXPECT_EQ(stiff.summary.method, "exponential");
-  EXPECT_NE(stiff.summary.why_method.find("of the fastest motion"), std::string::npos) << stiff.summary.why_method;
+  EXPECT_NE(stiff.summary.why_method.find("linear motions reach"), std::string::npos) << stiff.summary.why_method;
   const Tree body(free_bodies({{0.134942, 0.10477, 0.05858}}));
   TreeState tumbling = body.at_rest();
   tumbling.joints[0].omega = Vector3d(0.1, 1, 0.05);

@@ -410,6 +410,32 @@ TEST(TreeScenes, WireSpinnerFliesSteadily) {
               r.trajectory.summary.energy_balance, r.trajectory.summary.momentum_drift);
 }
 
+// Stiffness that a spin makes is in the linear part, too: from the start, or once the spin has come.
+TEST(TreeScenes, MoreModesOfWhatSpinsDoNotShrinkTheStep) {
+  struct Row {
+    const char* scene;
+    int modes, many;
+  };
+  for (const Row& row : {Row{"wire-spinner", 8, 24}, Row{"spin-up", 3, 11}}) {
+    Scene scene = scene_named(row.scene);
+    scene.tolerance = 1e-4, scene.error_budget = false;
+    const auto flown_with = [&](int modes) {
+      for (BodyScene& b : scene.bodies) {
+        if (b.structure == "rigid") continue;
+        b.modes = modes;
+        for (BeamSegment& s : b.geometry.segments) s.elements = std::max(s.elements, 16);
+      }
+      const IntegrationSummary s = run_scene(scene, {}).trajectory.summary;
+      EXPECT_EQ(s.method, "exponential") << row.scene;
+      std::printf("%s, %d modes: %ld steps, %ld evaluations\n", row.scene, modes, s.steps, s.rhs_evaluations);
+      return s;
+    };
+    const IntegrationSummary few = flown_with(row.modes), many = flown_with(row.many);
+    EXPECT_LT(10 * many.steps, 13 * few.steps) << row.scene;
+    EXPECT_LT(10 * many.rhs_evaluations, 15 * few.rhs_evaluations) << row.scene;
+  }
+}
+
 // ---- latching panel ----
 
 TEST(TreeScenes, LatchingPanelIsCaughtAndKeepsItsAngle) {
