@@ -92,8 +92,23 @@ TEST(TreeFlight, AFreeJointBetweenBodiesIsNotForExponentialCollocation) {
   s.joints[0].omega = Vector3d(0.1, 1, 0.05);
   EXPECT_THROW(integrate(tree, tree.pack(s), tree_options("exponential", 1e-6, 1, 0.1)), InputError);
   const TreeTrajectory flight = integrate(tree, tree.pack(s), tree_options("auto", 1e-8, 1, 0.1));
-  EXPECT_EQ(flight.summary.method, "bdf");
+  EXPECT_EQ(flight.summary.method, "adams");
   EXPECT_NE(flight.summary.why_method.find("free joint between two bodies"), std::string::npos);
+}
+
+// Laws are not for exponential collocation either; where vibrations are fast beside others, small steps are dear.
+TEST(TreeFlight, FastVibrationsAreForAnImplicitMethod) {
+  for (const int modes : {2, 12}) {
+    Multibody scene;
+    scene.gravity = Vector3d(0, -9.81, 0);
+    scene.bodies.push_back(eq14::reduced_body({1.0, 0.5, 20.0}, modes, eq14::Planes::xy, "link"));
+    scene.joints.push_back(testing::joint("shoulder", JointKind::hinge, place(-1), place(0)));
+    scene.joints[0].law.friction = {0.1, 0.1};
+    const Tree tree(scene);
+    const TreeTrajectory flight = integrate(tree, tree.pack(tree.at_rest()), tree_options("auto", 1e-5, 0.1, 0.1));
+    EXPECT_EQ(flight.summary.method, modes == 2 ? "adams" : "dirk");
+    EXPECT_NE(flight.summary.why_method.find("joints have laws"), std::string::npos);
+  }
 }
 
 TEST(TreeFlight, FlexibleArmKeepsItsEnergy) {
