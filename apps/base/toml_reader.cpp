@@ -224,6 +224,11 @@ void Faults::add(const std::string& path, const Place& place, const std::string&
   if (std::none_of(faults_.begin(), faults_.end(), covers)) faults_.push_back({place, path, text});
 }
 
+void Faults::append(const std::string& path, const std::string& text) {
+  const auto fault = std::ranges::find(faults_, path, &Fault::path);
+  if (fault != faults_.end()) fault->text += text;
+}
+
 bool Faults::clean(const std::string& path) const {
   return std::none_of(faults_.begin(), faults_.end(), [&path](const Fault& fault) {
     return holds(path, fault.path) || (!fault.path.empty() && holds(fault.path, path));
@@ -396,8 +401,11 @@ Eigen::Matrix3d TableReader::matrix(std::string_view key, const std::optional<Ei
 
 size_t TableReader::choice(std::string_view key, std::span<const std::string_view> names, size_t otherwise) {
   if (!has(key)) return otherwise;
-  const Value* value = find(key, Kind::text, true);
-  if (!value) return otherwise;
+  const Value* value = find(key);
+  if (value->kind != Kind::text) {
+    fault(key, fmt::format("{}; it must be {}", found(*value), listed(names)));
+    return otherwise;
+  }
   const auto name = std::find(names.begin(), names.end(), value->text);
   if (name != names.end()) return static_cast<size_t>(name - names.begin());
   fault(key, not_among(value->text, names));
@@ -405,9 +413,20 @@ size_t TableReader::choice(std::string_view key, std::span<const std::string_vie
 }
 
 std::optional<TableReader> TableReader::table(std::string_view key, bool required) {
-  const Value* value = find(key, Kind::table, required);
+  const Value* value = find(key);
+  if (value && value->kind != Kind::table) return in_place_of(*value, path(key));
+  if (!value && required) fault(key, "is missing; give a table");
   if (!value) return std::nullopt;
   return TableReader(*value, path(key), *faults_);
+}
+
+TableReader TableReader::in_place_of(const Value& other, std::string path) {
+  static const Value empty;
+  faults_->add(path, other.place, found(other) + "; it must be a table");
+  TableReader table(empty, path, *faults_);
+  faults_->locate(path, other.place);
+  table.is_of_other_kind_ = true;
+  return table;
 }
 
 std::vector<TableReader> TableReader::tables(std::string_view key) {
@@ -425,11 +444,7 @@ std::vector<TableReader> TableReader::tables(std::string_view key) {
   for (size_t i = 0; i < array->items.size(); ++i) {
     const Value& item = array->items[i];
     const std::string item_path = fmt::format("{}[{}]", path(key), i);
-    if (item.kind == Kind::table) {
-      result.emplace_back(item, item_path, *faults_);
-    } else {
-      faults_->add(item_path, item.place, found(item) + "; it must be a table");
-    }
+    result.push_back(item.kind == Kind::table ? TableReader(item, item_path, *faults_) : in_place_of(item, item_path));
   }
   return result;
 }
@@ -437,6 +452,7 @@ std::vector<TableReader> TableReader::tables(std::string_view key) {
 void TableReader::reject_unknown(const std::string& hint) {
   const std::vector<std::string_view> known(known_.begin(), known_.end());
   for (const std::string_view key : known) faults_->note_key(path(key));
+  if (is_of_other_kind_ && !known.empty()) faults_->append(path_, fmt::format(" with {}", fmt::join(known, ", ")));
   for (const auto& [name, value] : table_->entries) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     const std::string near = nearest(name, known);

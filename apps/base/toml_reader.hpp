@@ -79,6 +79,9 @@ class Faults {
   void add(const std::string& path, const std::string& text);
   void add(const std::string& path, const Place&, const std::string& text);
 
+  /// Goes on with the text of the fault at this path, if there is one.
+  void append(const std::string& path, const std::string& text);
+
   /// Whether nothing was found at this path, above it or below it.
   bool clean(const std::string& path) const;
   bool empty() const { return faults_.empty(); }
@@ -128,7 +131,8 @@ class TableReader {
   /// Index of a text among names.
   size_t choice(std::string_view key, std::span<const std::string_view> names, size_t otherwise);
 
-  /// A table below; absent and not required: nothing.
+  /// A table below; absent and not required: nothing. Something else in its place is a fault, and the table that is
+  /// returned is empty: the fault names the keys that are asked of it.
   std::optional<TableReader> table(std::string_view key, bool required = false);
 
   /// The tables of an array of tables; absent: empty.
@@ -152,11 +156,13 @@ class TableReader {
   /// The value of a key if it is there and of that kind; faults otherwise.
   const Value* find(std::string_view key, Value::Kind, bool required);
   bool numbers(const Value& array, std::string_view key, double* out);
+  TableReader in_place_of(const Value& other, std::string path);
 
   const Value* table_;
   std::string path_;
   Faults* faults_;
   std::vector<std::string> known_;
+  bool is_of_other_kind_ = false;
 };
 
 /// Adds a fault where the first key is not the format.

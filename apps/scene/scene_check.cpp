@@ -14,6 +14,7 @@
 #include <cmath>
 #include <numbers>
 #include <set>
+#include <utility>
 
 // Comparisons are written so that NaN fails them where a value stands alone, and passes where two values are compared:
 // then the fault is reported at the value that is NaN, once.
@@ -211,7 +212,16 @@ void check_scene(const Scene& scene, Faults& faults) {
 }
 
 void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
+  constexpr double thick = 1e5;  // [m] of the atmosphere, in which no orbit lasts
+  if (scene.orbit && scene.orbit->altitude < thick)
+    warnings.push_back(
+        fmt::format("orbit.altitude: {:g} m is inside the atmosphere; it is in m", scene.orbit->altitude));
   const auto look = [&](const std::string& of, const HingeMechanism& m, double start, std::string_view unit) {
+    constexpr double turns = 4 * std::numbers::pi;  // of a hinge, whose springs and stops count them
+    for (const auto& [what, value] : {std::pair("starts", start), std::pair("has the rest of its spring", m.rest)})
+      if (unit == "rad" && std::abs(value) > turns)
+        warnings.push_back(fmt::format("{}: {} at {:g} rad, {:.1f} turns; angles are in rad", of, what, value,
+                                       std::abs(value) / (2 * std::numbers::pi)));
     if (m.stop_stiffness == 0) return;
     if (m.stiffness > 0 && m.rest > m.threshold)
       warnings.push_back(

@@ -20,13 +20,7 @@
 namespace flexboom {
 namespace {
 
-class Budget : public testing::TestWithParam<std::string> {
- protected:
-  RunResult run(Scene scene) const {
-    scene.formulation = GetParam();
-    return run_scene(scene, {});
-  }
-};
+using Budget = InBothFormulations;
 INSTANTIATE_TEST_SUITE_P(Formulations, Budget, testing::Values("relative", "multipliers"),
                          [](const auto& row) { return row.param; });
 

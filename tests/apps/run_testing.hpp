@@ -56,4 +56,13 @@ inline Eigen::Vector3d vector_at(const RunResult& r, const std::string& name, Ei
   return {column(r, name + ".x")[row], column(r, name + ".y")[row], column(r, name + ".z")[row]};
 }
 
+/// Runs of scenes in the formulation that is the parameter.
+class InBothFormulations : public ::testing::TestWithParam<std::string> {
+ protected:
+  RunResult run(Scene scene) const {
+    scene.formulation = GetParam();
+    return run_scene(scene, {});
+  }
+};
+
 }  // namespace flexboom

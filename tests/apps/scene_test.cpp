@@ -220,6 +220,21 @@ TEST(Scene, EveryFaultIsReportedInOneGo) {
   EXPECT_LT(fault.find("mode: unknown key"), fault.find("bodies[0].segments[0].material.nu: is 0.6"));
 }
 
+TEST(Scene, WhatStandsInTheWrongPlaceIsToldWhatCouldStandThere) {
+  const auto fault = [](const std::string& text) { return fault_of("format = \"flexboom-scene-1\"\n" + text); };
+  const auto expect = [&](const std::string& text, const std::string& words) {
+    EXPECT_NE(fault(text).find(words), std::string::npos) << fault(text);
+  };
+  expect("accuracy = 1e-3", "accuracy: is the number 0.001; it must be a table with tolerance, outputs, absolute");
+  expect("[[bodies]]\nname = \"boom\"\ndamping = 0.01", "damping: is the number 0.01; it must be a table with rule");
+  expect("[[joints]]\nb = \"boom\"", "joints[0].b: is the string \"boom\"; it must be a table with body, marker");
+  expect("bodies = [1]", "bodies[0]: is the whole number 1; it must be a table with mass");
+  expect("[orbit]\ngravity = 9.81", "orbit.gravity: is the number 9.81; it must be \"none\" or \"differential\"");
+  expect("[[joints]]\nkind = 3", "joints[0].kind: is the whole number 3; it must be \"fixed\"");
+  // What follows from it is not told.
+  EXPECT_EQ(fault("[[bodies]]\nname = \"boom\"\ndamping = 0.01").find("rule: is missing"), std::string::npos);
+}
+
 TEST(Body, ExamplesAreRead) {
   const BodyScene boom = read_body(meshes / "boom4.toml");
   EXPECT_EQ(boom.modes, 10);

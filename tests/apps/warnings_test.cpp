@@ -18,13 +18,7 @@
 namespace flexboom {
 namespace {
 
-class WarningsOfRuns : public testing::TestWithParam<std::string> {
- protected:
-  RunResult run(Scene scene) const {
-    scene.formulation = GetParam();
-    return run_scene(scene, {});
-  }
-};
+using WarningsOfRuns = InBothFormulations;
 INSTANTIATE_TEST_SUITE_P(Formulations, WarningsOfRuns, testing::Values("relative", "multipliers"),
                          [](const auto& row) { return row.param; });
 
@@ -84,6 +78,13 @@ TEST(Warnings, OfSpringsAndStartsBeyondTheStop) {
     EXPECT_TRUE(parse_scene(text, "x.toml").warnings.empty());
   for (const std::string& name : builtin_scene_names())
     EXPECT_FALSE(any_has(load_scene(name).warnings, "beyond the stop")) << name;
+}
+
+TEST(Warnings, OfKilometresAndDegrees) {
+  const std::string joint = swing_on_joints + "rest = 90\n";
+  EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: has the rest of its spring at 90 rad"));
+  const std::string scene = swing_on_hinge + "[orbit]\naltitude = 405\n";
+  EXPECT_TRUE(any_has(parse_scene(scene, "x.toml").warnings, "orbit.altitude: 405 m is inside the atmosphere"));
 }
 
 // What a file says of itself is read where it is used.
