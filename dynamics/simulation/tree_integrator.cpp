@@ -6,6 +6,7 @@
 #include "dynamics/methods/linear_parts.hpp"
 #include "dynamics/methods/ode.hpp"
 #include "dynamics/relative/split.hpp"
+#include "dynamics/simulation/method_choice.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
@@ -56,24 +57,6 @@ class Pilot {
   bool is_small_;
   double fastest_ = 0;  // [rad/s]
 };
-
-/// Of the elastic coordinates of all bodies, the largest frequency by the smallest; 1 of rigid bodies.
-double frequency_ratio(const Multibody& scene) {
-  double least = std::numeric_limits<double>::infinity(), largest = 0;
-  for (const ReducedBody& body : scene.bodies)
-    for (int k = 0; k < body.n(); ++k) {
-      const double square = body.Ke(k, k) / body.Me(k, k);
-      if (square > 0) least = std::min(least, square), largest = std::max(largest, square);
-    }
-  return largest > 0 ? std::sqrt(largest / least) : 1;
-}
-
-/// Where exponential collocation cannot fly. The steps of Adams follow the fastest vibration, those of the implicit
-/// Runge-Kutta method what is wanted; each of them costs ten of Adams. Measured: a panel of 1 to 16 modes, 1e-3 to
-/// 1e-9.
-std::string multistep_or_implicit(const Multibody& scene, double tolerance) {
-  return frequency_ratio(scene) > 30 * std::pow(tolerance, -0.1) ? "dirk" : "adams";
-}
 
 class TreeFlight final : public Flight<TreeTrajectory> {
  public:
@@ -354,7 +337,7 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   };
   if (o.method != "auto") return fly(o.method, "");
   const auto fly_by_others = [&](const std::string& why) {
-    const std::string method = multistep_or_implicit(tree.scene(), o.tolerance);
+    const std::string method = method_beside_exponential(tree, start, o);
     try {
       return fly(method, why);
     } catch (const MethodFailure& failure) {
