@@ -80,7 +80,7 @@ class ExponentialStepper final : public Stepper {
   void step(double t_end, double& t, VectorXd& y, std::span<int> crossed) override {
     std::ranges::fill(crossed, 0);
     if (pending_) advance_start();
-    if (renewal_.is_due(counts_.steps, counts_.rhs_evaluations, step_.start)) relinearise(0);
+    if (renewal_.is_due(counts_.steps, counts_.rhs_evaluations, step_.start)) try_relinearising();
     std::exception_ptr unfit;
     for (int failures = 0;; ++failures) {
       const double left = t_end - step_.start;
@@ -189,7 +189,7 @@ class ExponentialStepper final : public Stepper {
     else if (diverges)
       relinearise(failures < many ? 1e-3 : 1e-9);
     else if (failures >= 2 && !first_ && !is_fresh)  // what is stiff and not in L keeps the error from falling
-      relinearise(0);
+      try_relinearising();
   }
 
   /// Takes L where the step starts, unless it was taken near there: that costs as much as some steps.
@@ -198,10 +198,23 @@ class ExponentialStepper final : public Stepper {
     for (const auto& [value, rate] : layout_.coordinates) base[rate] = 0;
     const auto there = step_.linear->base.head(nx_), here = base.head(nx_);
     if (near > 0 && (there - here).norm() <= near * std::max(there.norm(), here.norm())) return;
-    step_.linear = &parts_.renew(step_.start, base);
     renewal_.taken(counts_.steps);
+    try {
+      step_.linear = &parts_.renew(step_.start, base);
+    } catch (const NumericalError&) {  // with its angular velocity L may have too few eigenvectors
+      for (const SplitLayout::Turn& turn : layout_.turns) base.segment<3>(turn.omega).setZero();
+      step_.linear = &parts_.renew(step_.start, base);
+    }
     begin(start_);
     first_ = true;
+  }
+
+  /// Where the L that there is does, if another one does not.
+  void try_relinearising() {
+    try {
+      relinearise(0);
+    } catch (const NumericalError&) {
+    }
   }
 
   double first_step() const {
