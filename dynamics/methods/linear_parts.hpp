@@ -17,7 +17,7 @@ namespace flexboom {
 inline constexpr double held = 1e-3;
 
 /// The linear parts L of x' = L x + N of a flight: one for each set of closed stops, taken at rest near where the
-/// joints are, and kept.
+/// joints are, and kept until `renew` puts another in its place.
 class LinearParts {
  public:
   explicit LinearParts(SplitProblem&);
