@@ -11,7 +11,8 @@ namespace flexboom {
 /// next.
 class Renewal {
  public:
-  explicit Renewal(long size_of_state) : shortest_wait_(2 * block + 2 * size_of_state), wait_(shortest_wait_) {}
+  /// n: size of the state. Eigenvectors cost n^3, a step n to n^2.
+  explicit Renewal(long n) : shortest_wait_(2 * block + n + n * n / 60), wait_(shortest_wait_) {}
 
   void taken(long steps) { taken_ = steps, is_own_ = true; }
 
@@ -41,7 +42,7 @@ class Renewal {
 
   void begin_block(long steps, long evaluations, double t) { begun_ = steps, evaluations_ = evaluations, t_ = t; }
 
-  long shortest_wait_, wait_;  // taking L costs as much as so many steps
+  long shortest_wait_, wait_;  // taking L costs a tenth of so many steps
   long taken_ = 0, begun_ = 0, evaluations_ = 0;
   double t_ = 0, pace_ = 0;  // pace: time by evaluation, of a block of steps
   bool is_own_ = false, judges_ = false;
