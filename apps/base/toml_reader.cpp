@@ -415,8 +415,7 @@ size_t TableReader::choice(std::string_view key, std::span<const std::string_vie
 std::optional<TableReader> TableReader::table(std::string_view key, bool required) {
   const Value* value = find(key);
   if (value && value->kind != Kind::table) return in_place_of(*value, path(key));
-  if (!value && required) fault(key, "is missing; give a table");
-  if (!value) return std::nullopt;
+  if (!find(key, Kind::table, required)) return std::nullopt;
   return TableReader(*value, path(key), *faults_);
 }
 

@@ -33,9 +33,11 @@ void read(KeyReader& r, const Key& k, double& v) { v = r.table().number(k.name, 
 void read(KeyReader& r, const Key& k, int& v) { v = r.table().integer(k.name, otherwise(k, v)); }
 void read(KeyReader& r, const Key& k, bool& v) { v = r.table().boolean(k.name, v); }
 void read(KeyReader& r, const Key& k, std::string& v) {
-  const bool is_chosen = !k.words.empty() && r.has(k.name) && !r.table().is_text(k.name);
-  if (is_chosen) r.table().choice(k.name, k.words, 0);  // a fault that names the words
-  if (!is_chosen) v = r.table().text(k.name, otherwise(k, v));
+  const bool is_of_other_kind = r.has(k.name) && !r.table().is_text(k.name);
+  if (!k.words.empty() && is_of_other_kind)
+    r.table().choice(k.name, k.words, 0);  // a fault that names the words
+  else
+    v = r.table().text(k.name, otherwise(k, v));
 }
 void read(KeyReader& r, const Key& k, Vector3d& v) { v = r.table().vector(k.name, otherwise(k, v)); }
 void read(KeyReader& r, const Key& k, std::vector<std::string>& v) { v = r.table().texts(k.name, v); }

@@ -194,10 +194,20 @@ class ExponentialStepper final : public Stepper {
 
   /// Takes L where the step starts, unless it was taken near there: that costs as much as some steps.
   void relinearise(double near) {
+    VectorXd base = base_here();
+    const auto there = step_.linear->base.head(nx_), here = base.head(nx_);
+    if ((there - here).norm() <= near * std::max(there.norm(), here.norm())) return;
+    take_linear_part(base);
+  }
+
+  /// The state at the start of the step, but for the rates of coordinates.
+  VectorXd base_here() const {
     VectorXd base = start_;
     for (const auto& [value, rate] : layout_.coordinates) base[rate] = 0;
-    const auto there = step_.linear->base.head(nx_), here = base.head(nx_);
-    if (near > 0 && (there - here).norm() <= near * std::max(there.norm(), here.norm())) return;
+    return base;
+  }
+
+  void take_linear_part(VectorXd base) {
     renewal_.taken(counts_.steps);
     try {
       step_.linear = &parts_.renew(step_.start, base);
@@ -209,10 +219,10 @@ class ExponentialStepper final : public Stepper {
     first_ = true;
   }
 
-  /// Where the L that there is does, if another one does not.
+  /// Even where only time has changed what L is. Without another L, the one that there is serves on.
   void try_relinearising() {
     try {
-      relinearise(0);
+      take_linear_part(base_here());
     } catch (const NumericalError&) {
     }
   }
