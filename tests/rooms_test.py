@@ -1,4 +1,5 @@
 """No include points up. Folders: fem <- reduction <- dynamics <- apps. Inside each, a room includes only those listed.
+A header that is installed includes only those that are.
 Documents that are named exist, and so do their sections.
 
 Usage: rooms_test.py PROJECT_FOLDER
@@ -91,6 +92,19 @@ def faults(project):
                     yield f"{name}: includes {target}: room {room} is not above {there}"
 
 
+INSTALLED = re.compile(r"flexboom_library\(.*?HEADERS\n(.*?)SOURCES", re.DOTALL)
+
+
+def installation_faults(project):
+    """Headers that are installed and include one that is not."""
+    installed = {f"{folder}/{name}" for folder in FOLDERS
+                 for name in INSTALLED.search((project / folder / "CMakeLists.txt").read_text())[1].split()}
+    for name in sorted(installed):
+        for target in INCLUDE.findall((project / name).read_text()):
+            if target not in installed:
+                yield f"{name}: is installed and includes {target}, which is not"
+
+
 def cycle(known):
     """A room that can be reached from itself, or nothing."""
     def below(room, seen):
@@ -152,7 +166,7 @@ def document_faults(project):
 
 def main():
     project = pathlib.Path(sys.argv[1])
-    found = list(faults(project)) + list(document_faults(project.resolve()))
+    found = [*faults(project), *installation_faults(project), *document_faults(project.resolve())]
     found += [f"{folder}: room {cycle(known)} is above itself" for folder, known in ROOMS.items() if cycle(known)]
     print("\n".join(found) or "every include points down, and every document that is named is there")
     return 1 if found else 0

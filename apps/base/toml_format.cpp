@@ -24,7 +24,7 @@ Value parse_format(const std::string& text, const std::string& file, std::string
   for (const auto& [key, value] : root.entries) {
     const bool other = key == "format" && value.kind == Value::Kind::text && value.text != format;
     require(!other, fmt::format("{}:{}:{}: format: is {}; this version reads \"{}\" here", file, value.place.line,
-                                value.place.column, toml_reader::quoted(value.text), format));
+                                value.place.column, toml_reader::in_quotes(value.text), format));
   }
   return root;
 }

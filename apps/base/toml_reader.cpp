@@ -1,16 +1,11 @@
 #include "apps/base/toml_reader.hpp"
 
-#include "fem/base/check.hpp"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cctype>
 #include <limits>
-#include <numeric>
-#include <tuple>
 
 namespace flexboom::toml_reader {
 namespace {
@@ -19,86 +14,6 @@ using Kind = Value::Kind;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t max_tables = 2000;  // of one array; names are compared in pairs
-constexpr size_t max_line =
-    4096;  // bounds the depth of a dotted key, which the parser and its destructors recurse over
-
-Place place_at(const std::string& file, const toml::source_position& position) {
-  return {file, static_cast<int>(position.line), static_cast<int>(position.column)};
-}
-
-std::string where(const Place& place) {
-  if (place.file.empty()) return "";
-  if (place.line == 0) return place.file + ": ";
-  return fmt::format("{}:{}:{}: ", place.file, place.line, place.column);
-}
-
-Value convert(const toml::node& node, const Place& place);
-
-Value convert_array(const toml::array& array, const Place& place) {
-  Value value;
-  value.kind = Kind::array;
-  for (const toml::node& item : array) value.items.push_back(convert(item, place_at(place.file, item.source().begin)));
-  return value;
-}
-
-// toml++ sorts keys by name; people think in the order of the file.
-Value convert_table(const toml::table& table, const Place& place) {
-  Value value;
-  for (auto&& [key, item] : table) {
-    value.entries.push_back({std::string(key.str()), convert(item, place_at(place.file, key.source().begin))});
-  }
-  std::stable_sort(value.entries.begin(), value.entries.end(), [](const auto& a, const auto& b) {
-    return std::pair(a.second.place.line, a.second.place.column) <
-           std::pair(b.second.place.line, b.second.place.column);
-  });
-  return value;
-}
-
-Value convert_scalar(const toml::node& node) {
-  Value value;
-  value.kind = Kind::date;
-  if (const auto* text = node.as_string()) {
-    value.kind = Kind::text;
-    value.text = text->get();
-  } else if (const auto* integer = node.as_integer()) {
-    value.kind = Kind::integer;
-    value.integer = integer->get();
-    value.number = static_cast<double>(integer->get());
-  } else if (const auto* number = node.as_floating_point()) {
-    value.kind = Kind::number;
-    value.number = number->get();
-  } else if (const auto* boolean = node.as_boolean()) {
-    value.kind = Kind::boolean;
-    value.boolean = boolean->get();
-  }
-  return value;
-}
-
-Value convert(const toml::node& node, const Place& place) {
-  Value value = node.is_table()   ? convert_table(*node.as_table(), place)
-                : node.is_array() ? convert_array(*node.as_array(), place)
-                                  : convert_scalar(node);
-  value.place = place;
-  return value;
-}
-
-void check_lines(const std::string& text, const std::string& file) {
-  require(!text.starts_with("\x89HDF"),
-          fmt::format(
-              "{}:1:1: is an HDF5 file, not text; a reduced body is `file` of one of the [[bodies]] of a scene with "
-              "[[joints]], and `flexboom inspect` reads it",
-              file));
-  const size_t zero = text.find('\0');
-  require(zero == std::string::npos,
-          fmt::format("{}:1:1: is a binary file, not text: its byte {} is zero", file, zero + 1));
-  size_t begin = 0;
-  for (int line = 1; begin < text.size(); ++line) {
-    const size_t end = std::min(text.find('\n', begin), text.size());
-    require(end - begin <= max_line,
-            fmt::format("{}:{}:1: the line has {} characters; {} are allowed", file, line, end - begin, max_line));
-    begin = end + 1;
-  }
-}
 
 std::string kind_name(Kind kind) {
   switch (kind) {
@@ -120,14 +35,6 @@ std::string kind_name(Kind kind) {
   return "a table";
 }
 
-// At most 60 bytes, not cut inside a UTF-8 character.
-std::string shortened(const std::string& text) {
-  if (text.size() <= 60) return text;
-  size_t end = 57;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
-  return text.substr(0, end) + "...";
-}
-
 // What was found, with the value where that is short.
 std::string found(const Value& value) {
   switch (value.kind) {
@@ -138,7 +45,7 @@ std::string found(const Value& value) {
     case Kind::number:
       return fmt::format("is the number {}", value.number);
     case Kind::text:
-      return "is the string " + quoted(shortened(value.text));
+      return "is the string " + in_quotes(shortened(value.text));
     case Kind::array:
       return fmt::format("is an array of {}", value.items.size());
     case Kind::date:
@@ -150,114 +57,12 @@ std::string found(const Value& value) {
 
 bool is_number(const Value& value) { return value.kind == Kind::number || value.kind == Kind::integer; }
 
-// Edits (insert, delete, replace, swap neighbours) that turn a into b, upper and lower case alike.
-size_t edit_distance(std::string_view a, std::string_view b) {
-  const auto same = [](char x, char y) {
-    return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
-  };
-  std::vector<size_t> before, last(b.size() + 1), row(b.size() + 1);
-  std::iota(last.begin(), last.end(), size_t{0});
-  for (size_t i = 1; i <= a.size(); ++i) {
-    row[0] = i;
-    for (size_t j = 1; j <= b.size(); ++j) {
-      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (same(a[i - 1], b[j - 1]) ? 0 : 1)});
-      const bool swapped = i > 1 && j > 1 && same(a[i - 1], b[j - 2]) && same(a[i - 2], b[j - 1]);
-      if (swapped) row[j] = std::min(row[j], before[j - 2] + 1);
-    }
-    before = last;
-    last = row;
-  }
-  return last[b.size()];
-}
-
-// `"a", "b" or "c"`
-std::string listed(std::span<const std::string_view> names) {
-  std::string text;
-  for (size_t i = 0; i < names.size(); ++i) {
-    text += (i == 0 ? "" : i + 1 == names.size() ? " or " : ", ") + quoted(names[i]);
-  }
-  return text;
-}
-
 bool is_bare_key(const std::string& name) {
   return !name.empty() &&
          std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
 }
 
-std::string parent(const std::string& path) {
-  const size_t cut = path.find_last_of(".[");
-  return cut == std::string::npos ? "" : path.substr(0, cut);
-}
-
-// Whether b is a or lies below it.
-bool holds(const std::string& a, const std::string& b) {
-  if (!b.starts_with(a)) return false;
-  return a.empty() || b.size() == a.size() || b[a.size()] == '.' || b[a.size()] == '[';
-}
-
 }  // namespace
-
-Value parse(const std::string& text, const std::string& file) {
-  check_lines(text, file);
-  try {
-    return convert(toml::parse(text, file), {file, 1, 1});
-  } catch (const toml::parse_error& error) {
-    throw InputError(where(place_at(file, error.source().begin)) +
-                     "not valid TOML: " + std::string(error.description()));
-  }
-}
-
-void Faults::locate(const std::string& path, const Place& place) { places_[path] = place; }
-
-Place Faults::place_of(std::string path) const {
-  for (;; path = parent(path)) {
-    const auto place = places_.find(path);
-    if (place != places_.end()) return place->second;
-    if (path.empty()) return {};
-  }
-}
-
-void Faults::add(const std::string& path, const std::string& text) { add(path, place_of(path), text); }
-
-void Faults::add(const std::string& path, const Place& place, const std::string& text) {
-  const auto covers = [&path](const Fault& fault) { return !fault.path.empty() && holds(fault.path, path); };
-  if (std::none_of(faults_.begin(), faults_.end(), covers)) faults_.push_back({place, path, text});
-}
-
-void Faults::append(const std::string& path, const std::string& text) {
-  const auto fault = std::ranges::find(faults_, path, &Fault::path);
-  if (fault != faults_.end()) fault->text += text;
-}
-
-bool Faults::clean(const std::string& path) const {
-  return std::none_of(faults_.begin(), faults_.end(), [&path](const Fault& fault) {
-    return holds(path, fault.path) || (!fault.path.empty() && holds(fault.path, path));
-  });
-}
-
-void Faults::throw_if_any() const {
-  if (faults_.empty()) return;
-  std::vector<Fault> sorted = faults_;
-  std::stable_sort(sorted.begin(), sorted.end(), [](const Fault& a, const Fault& b) {
-    return std::tie(a.place.file, a.place.line, a.place.column) < std::tie(b.place.file, b.place.line, b.place.column);
-  });
-  std::vector<std::string> lines;
-  lines.reserve(sorted.size());
-  for (const Fault& fault : sorted) {
-    lines.push_back(where(fault.place) + (fault.path.empty() ? "" : fault.path + ": ") + fault.text);
-  }
-  throw InputError(fmt::format("{}", fmt::join(lines, "\n")));
-}
-
-void Faults::note_key(const std::string& path) {
-  if (!keys_) return;
-  std::string of_any;  // without the numbers of arrays
-  for (size_t i = 0; i < path.size(); ++i) {
-    of_any += path[i];
-    if (path[i] == '[') i = path.find(']', i) - 1;
-  }
-  keys_->insert(of_any);
-}
 
 TableReader::TableReader(const Value& table, std::string path, Faults& faults)
     : table_(&table), path_(std::move(path)), faults_(&faults) {
@@ -455,43 +260,11 @@ void TableReader::reject_unknown(const std::string& hint) {
   for (const auto& [name, value] : table_->entries) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
     const std::string near = nearest(name, known);
-    faults_->add(path(is_bare_key(name) ? name : quoted(name)), value.place,
-                 fmt::format("unknown key; {}{} takes {}{}", near.empty() ? "" : "did you mean " + quoted(near) + "? ",
-                             path_.empty() ? "the top level" : path_, fmt::join(known, ", "), hint));
+    faults_->add(
+        path(is_bare_key(name) ? name : in_quotes(name)), value.place,
+        fmt::format("unknown key; {}{} takes {}{}", near.empty() ? "" : "did you mean " + in_quotes(near) + "? ",
+                    path_.empty() ? "the top level" : path_, fmt::join(known, ", "), hint));
   }
-}
-
-std::string nearest(std::string_view value, std::span<const std::string_view> names) {
-  value = value.substr(0, 100);
-  size_t best = std::max<size_t>(1, value.size() / 3) + 1;
-  std::string result;
-  for (const std::string_view name : names) {
-    const size_t distance = edit_distance(value, name);
-    if (distance >= best) continue;
-    best = distance;
-    result = name;
-  }
-  return result;
-}
-
-std::string not_among(const std::string& value, std::span<const std::string_view> names) {
-  const std::string near = nearest(value, names);
-  return fmt::format("is {}; {}it must be {}", quoted(shortened(value)),
-                     near.empty() ? "" : "did you mean " + quoted(near) + "? ", listed(names));
-}
-
-std::string quoted(std::string_view text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    const auto code = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') result += '\\';
-    if (code < 0x20 || code == 0x7f) {
-      result += fmt::format("\\u{:04X}", code);
-    } else {
-      result += c;
-    }
-  }
-  return result + '"';
 }
 
 }  // namespace flexboom::toml_reader

@@ -21,8 +21,8 @@ inline std::string toml(double value) {
 }
 inline std::string toml(bool value) { return value ? "true" : "false"; }
 inline std::string toml(int value) { return fmt::format("{}", value); }
-inline std::string toml(const std::string& value) { return toml_reader::quoted(value); }
-inline std::string toml(std::string_view value) { return toml_reader::quoted(value); }
+inline std::string toml(const std::string& value) { return toml_reader::in_quotes(value); }
+inline std::string toml(std::string_view value) { return toml_reader::in_quotes(value); }
 inline std::string toml(const Eigen::Vector3d& v) {
   return fmt::format("[{}, {}, {}]", toml(v.x()), toml(v.y()), toml(v.z()));
 }

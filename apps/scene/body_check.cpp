@@ -102,7 +102,7 @@ void check_eq14(Faults& faults, const std::string& path, const BodyScene& body) 
   if (!boom.attachments.empty()) fault = fmt::format("this one has {} attachment(s)", boom.attachments.size());
   if (boom.segments.size() == 1 && is_tapered(boom.segments[0])) fault = "this one is tapered";
   if (boom.segments.size() == 1 && boom.segments[0].material.rho == 0) fault = "this one has rho = 0";
-  if (body.clamp != "root") fault = fmt::format("this one is clamped at {}", toml_reader::quoted(body.clamp));
+  if (body.clamp != "root") fault = fmt::format("this one is clamped at {}", toml_reader::in_quotes(body.clamp));
   if (!fault.empty()) {
     faults.add(
         join(path, "structure"),
@@ -188,7 +188,7 @@ void check_clamp(Faults& faults, const std::string& path, const BodyScene& body)
   if (body.clamp != "root" && body.basis.name != "clamped" && faults.clean(join(path, "basis")))
     faults.add(
         join(path, "clamp"),
-        fmt::format("is {}, but the basis \"{}\" {}; drop it", toml_reader::quoted(body.clamp), body.basis.name,
+        fmt::format("is {}, but the basis \"{}\" {}; drop it", toml_reader::in_quotes(body.clamp), body.basis.name,
                     body.basis.name == "hinge"         ? "is that of a hinge at the root"
                     : body.basis.name == "prestressed" ? "is that of a body held at its root"
                                                        : "is not held by a clamp, but by its interfaces or nowhere"));
@@ -204,7 +204,7 @@ void check_interfaces(Faults& faults, const std::string& path, const BodyScene& 
     if (!connection.empty() && connection != ":rigid" && connection != ":distributing")
       faults.add(join(path, "interfaces"), fmt::format("has {}; behind the place stands nothing, \":rigid\" or "
                                                        "\":distributing\"",
-                                                       toml_reader::quoted(text)));
+                                                       toml_reader::in_quotes(text)));
   }
   if (basis.reference.empty())
     return faults.add(join(path, "reference"),
@@ -240,7 +240,7 @@ void check_basis(Faults& faults, const std::string& path, const BodyScene& body)
       const auto [set, direction] = place_and_direction("is not understood", text);
       check_name_among(faults, join(path, "corrections"), set, sets_of(body));
       if (!direction.starts_with('F') && !direction.starts_with('M'))
-        throw InputError(fmt::format("has {}; a load is Fx, Fy, Fz, Mx, My or Mz", toml_reader::quoted(text)));
+        throw InputError(fmt::format("has {}; a load is Fx, Fy, Fz, Mx, My or Mz", toml_reader::in_quotes(text)));
       component_of(direction);
     } catch (const InputError& error) {
       faults.add(join(path, "corrections"), error.what());

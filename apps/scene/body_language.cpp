@@ -198,7 +198,7 @@ void prestress_keys(Archive& a, SteadyMotion& m) {
     else
       reader->table().fault("turns",
                             fmt::format(R"(has {}; an axis of the body is "x", "y", "z", or "X,Y,Z" of a direction)",
-                                        toml_reader::quoted(text)));
+                                        toml_reader::in_quotes(text)));
   }
 }
 

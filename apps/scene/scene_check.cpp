@@ -78,7 +78,7 @@ void check_accuracy(Faults& faults, const Scene& scene) {
       check_name_among(faults, "accuracy.outputs", output, names);
     else
       faults.add("accuracy.outputs",
-                 fmt::format("names {}, but {}", toml_reader::quoted(output), no_tip(*without->reduced)));
+                 fmt::format("names {}, but {}", toml_reader::in_quotes(output), no_tip(*without->reduced)));
   }
 }
 
@@ -130,7 +130,7 @@ void check_body_names(Faults& faults, const Scene& scene) {
     const std::string& name = scene.bodies[i].name;
     if (!taken.insert(name).second) {
       faults.add(fmt::format("bodies[{}].name", i),
-                 fmt::format("{} is taken; choose another", toml_reader::quoted(name)));
+                 fmt::format("{} is taken; choose another", toml_reader::in_quotes(name)));
     }
   }
 }
@@ -144,12 +144,13 @@ void check_hinge_bodies(Faults& faults, const Scene& scene) {
     const std::string path = fmt::format("hinges[{}].body", i);
     const std::string& body = scene.hinges[i].body;
     if (names.empty()) {
-      faults.add(path, fmt::format("is {}, but the scene has no bodies; give [[bodies]]", toml_reader::quoted(body)));
+      faults.add(path,
+                 fmt::format("is {}, but the scene has no bodies; give [[bodies]]", toml_reader::in_quotes(body)));
     } else {
       check_name_among(faults, path, body, names);
     }
     if (!hinged.insert(body).second) {
-      faults.add(path, fmt::format("{} has a hinge already; each body takes one", toml_reader::quoted(body)));
+      faults.add(path, fmt::format("{} has a hinge already; each body takes one", toml_reader::in_quotes(body)));
     }
   }
 }

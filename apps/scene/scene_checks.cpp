@@ -71,7 +71,7 @@ void name(Faults& faults, const std::string& path, const std::string& name, std:
   const auto allowed = [](unsigned char c) { return (c < 0x80 && std::isalnum(c)) || c == '_' || c == '-'; };
   if (name.empty() || !std::all_of(name.begin(), name.end(), allowed)) {
     faults.add(path, fmt::format("is {}; it must be one or more of the letters a-z, A-Z, digits, _ and -",
-                                 toml_reader::quoted(name)));
+                                 toml_reader::in_quotes(name)));
   }
 }
 

@@ -55,7 +55,7 @@ class TreeCheck {
       std::set<std::string> taken = {"energy"};
       each(what, items, [&](const std::string& path, const auto& item) {
         if (!taken.insert(item.name).second)
-          faults_.add(path + ".name", fmt::format("{} is taken; choose another", toml_reader::quoted(item.name)));
+          faults_.add(path + ".name", fmt::format("{} is taken; choose another", toml_reader::in_quotes(item.name)));
       });
     };
     unique("joints", scene_.joints), unique("springs", scene_.springs), unique("loads", scene_.loads);
@@ -132,7 +132,7 @@ class TreeCheck {
       faults_.add(path + ".closes_loop", "is true: a loop needs [integrator] formulation = \"multipliers\"");
     if (j.a.body == j.b.body)
       faults_.add(path + ".b",
-                  fmt::format("is on {} as a is; a joint is between two bodies", toml_reader::quoted(j.b.body)));
+                  fmt::format("is on {} as a is; a joint is between two bodies", toml_reader::in_quotes(j.b.body)));
     const JointScene none;
     const bool starts = !j.start.empty() || !j.start_rate.empty() || j.start_attitude != none.start_attitude ||
                         !j.start_omega.isZero(0) || !j.start_position.isZero(0) || !j.start_velocity.isZero(0);
@@ -195,7 +195,7 @@ class TreeCheck {
   void turn(const std::string& path, const TurnScene& t) {
     if (t.body != scene_.turns.front().body)
       faults_.add(path + ".body", fmt::format("is not {}, the body of the first turn; all turns are of one body",
-                                              toml_reader::quoted(scene_.turns.front().body)));
+                                              toml_reader::in_quotes(scene_.turns.front().body)));
     if (faults_.clean(path)) try {
         rest_to_rest(t.manoeuvre);
       } catch (const InputError& error) {
@@ -216,7 +216,7 @@ class TreeCheck {
     if (axes.size() != 3 || std::abs(axes[0].cross(axes[1]).dot(axes[2])) < 0.1)
       faults_.add("turns[0].body", fmt::format("{} has {} wheels without a torque of their own; three are needed, with "
                                                "axes that span space",
-                                               toml_reader::quoted(body), axes.size()));
+                                               toml_reader::in_quotes(body), axes.size()));
     bool free = false;
     for (const JointScene& j : scene_.joints) {
       free = free || (j.kind == JointKind::free && j.a.body.empty() && j.b.body == body);
@@ -226,7 +226,7 @@ class TreeCheck {
     if (!free)
       faults_.add("turns[0].body",
                   fmt::format("{} can not turn: it needs a joint of kind \"free\" to the inertial frame",
-                              toml_reader::quoted(body)));
+                              toml_reader::in_quotes(body)));
     if (std::ranges::any_of(scene_.joints, [](const JointScene& j) { return j.closes_loop; }))
       faults_.add("turns", "need a tree: with closed loops give the wheels their torques");
     if (!rest) faults_.add("turns", "start from rest: joints and wheels must have no rates at t = 0");
@@ -240,22 +240,23 @@ class TreeCheck {
       if (j.closes_loop) continue;
       const auto [first, only] = carrier.emplace(j.b.body, i);
       if (!only)
-        faults_.add(fmt::format("joints[{}].b", i),
-                    fmt::format("body {} hangs on joint {} already: this one closes a loop; it may start from another "
-                                "body, or say closes_loop = true",
-                                toml_reader::quoted(j.b.body), toml_reader::quoted(scene_.joints[first->second].name)));
+        faults_.add(
+            fmt::format("joints[{}].b", i),
+            fmt::format("body {} hangs on joint {} already: this one closes a loop; it may start from another "
+                        "body, or say closes_loop = true",
+                        toml_reader::in_quotes(j.b.body), toml_reader::in_quotes(scene_.joints[first->second].name)));
     }
     for (size_t i = 0; i < scene_.bodies.size(); ++i) {
       const std::string& name = scene_.bodies[i].name;
       if (!carrier.contains(name)) {
         faults_.add(fmt::format("bodies[{}]", i),
                     fmt::format("{} hangs on no joint; if it is free, give it one of kind \"free\"",
-                                toml_reader::quoted(name)));
+                                toml_reader::in_quotes(name)));
       } else if (!leads_home(name, carrier)) {
         faults_.add(fmt::format("joints[{}].a", carrier[name]),
                     fmt::format("body {} hangs on itself in a circle of joints; one of them must start from the "
                                 "inertial frame",
-                                toml_reader::quoted(name)));
+                                toml_reader::in_quotes(name)));
       }
     }
   }
