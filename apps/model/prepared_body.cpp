@@ -256,6 +256,7 @@ PreparedBody prepare_body(const BodyScene& b, int refine, const std::filesystem:
 
 PreparedBody PreparedBodies::get(const BodyScene& b, int refine, const std::filesystem::path& keep) {
   if (!b.is_boom()) return prepare_body(b, refine, keep);
+  const std::lock_guard alone(guard_);
   constexpr size_t most = 200;  // bodies that vary are met once: what they take of the memory must end
   BodyScene unnamed = b;
   if (b.structure == "beam") unnamed.name.clear();  // solids are kept by their names

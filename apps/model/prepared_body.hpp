@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <map>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -38,13 +39,15 @@ bool is_bearable(const Mesh&);
 /// made of is the same. @throws InputError, NumericalError.
 PreparedBody prepare_body(const BodyScene&, int refine = 0, const std::filesystem::path& keep = {});
 
-/// Bodies that were made, for runs with equal ones. They are told apart by all that they are made of.
+/// Bodies that were made, for runs with equal ones. They are told apart by all that they are made of. Threads may share
+/// them.
 class PreparedBodies {
  public:
   /// As prepare_body.
   PreparedBody get(const BodyScene&, int refine = 0, const std::filesystem::path& keep = {});
 
  private:
+  std::mutex guard_;                           // solvers of modes bear one thread alone, too
   std::map<std::string, PreparedBody> whole_;  // with all shapes
 };
 

@@ -2,6 +2,7 @@
 
 #include "apps/model/bounded_modes.hpp"
 #include "apps/model/prepared_body.hpp"
+#include "apps/simulate/flights_ahead.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
@@ -103,7 +104,7 @@ struct Repeats {
 
   /// Another flight at a bearable cost.
   Run repeated(const Run& run, const Scene& other, int refine = 0) const {
-    return run_once(other, hooks, refine, bearable_steps(run));
+    return fly(other, hooks, refine, bearable_steps(run));
   }
 
   std::vector<OutputDifference> difference(const Run& run, const Run& other, const Scene& scene) const {
@@ -165,35 +166,42 @@ std::vector<OutputDifference> Repeats::change(const Run& run, const Scene& other
   return difference(run, repeated(run, with_a_digit_more(other), refine), other);
 }
 
-/// The modes left out, first with few digits: more only where the answer would drown in the error of time integration,
-/// which is `noise` times the tolerance of the integrator.
-/// A jump of an acceleration rings all modes of a body, and a load of its joint converges like their effective mass: as
-/// 1 / n. What as many modes more change is then half of the error.
-Finding modes_beyond(const Run& run, const Scene& flown, const StillKinds& still, bool loads, double noise,
-                     const Repeats& repeats) {
-  Scene more = without_kinds(with_more_modes(flown, {.as_many = loads}, repeats.hooks), still, repeats.hooks);
+/// The modes left out, and whether they are flown with fewer digits than the run.
+struct Beyond {
+  Scene scene;
+  bool has_few_digits = false;
+};
+
+/// Nothing where no body is elastic. The modes are flown with few digits first: more only where the answer would drown
+/// in the error of time integration. @throws InputError where the scene has no more modes.
+std::optional<Beyond> modes_beyond(const Scene& scene, const Scene& flown, const StillKinds& still,
+                                   const ErrorBudget& budget, const RunHooks& hooks) {
+  require_richer(scene, &RicherBodies::more_modes, "more modes");
+  if (!any_elastic(scene)) return {};
+  if (scene.from) throw InputError("a saved state knows nothing of modes beyond its own");
+  const bool loads = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name);
+  Beyond r{without_kinds(with_more_modes(flown, {.as_many = loads}, hooks), still, hooks)};
   constexpr double few_digits = 1e-5;
-  const bool has_many = flown.tolerance < few_digits;
-  if (has_many) more.tolerance = few_digits, more.integrator_tolerance = 0;
+  r.has_few_digits = flown.tolerance < few_digits;
+  if (r.has_few_digits) r.scene.tolerance = few_digits, r.scene.integrator_tolerance = 0;
+  return r;
+}
+
+/// What they change. A jump of an acceleration rings all modes of a body, and a load of its joint converges like their
+/// effective mass: as 1 / n. What as many modes more change is then half of the error.
+Finding truncation_of(std::optional<Beyond> beyond, const Run& run, const Scene& flown, double time_error,
+                      const Repeats& repeats) {
+  if (!beyond) return {};
+  Scene& more = beyond->scene;
   Finding r{repeats.change(run, more)};
-  if (has_many && largest(r.differences) <= 10 * noise * few_digits) {
+  const double noise = time_error > flown.step_tolerance() ? time_error / flown.step_tolerance() : 1;
+  if (beyond->has_few_digits && largest(r.differences) <= 10 * noise * more.tolerance) {
     more.tolerance = flown.tolerance, more.integrator_tolerance = flown.integrator_tolerance;
     r.differences = repeats.change(run, more);
   }
   for (OutputDifference& d : r.differences)
     if (is_load(d.name)) d.error *= 2;
   return r;
-}
-
-/// The truncation. @throws InputError where the scene has no more modes.
-Finding truncation_of(const Scene& scene, const Run& run, const Scene& flown, const StillKinds& still,
-                      const ErrorBudget& budget, const Repeats& repeats) {
-  require_richer(scene, &RicherBodies::more_modes, "more modes");
-  if (!any_elastic(scene)) return {};
-  if (scene.from) throw InputError("a saved state knows nothing of modes beyond its own");
-  const bool loads = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name);
-  const double noise = budget.time > flown.step_tolerance() ? budget.time / flown.step_tolerance() : 1;
-  return modes_beyond(run, flown, still, loads, noise, repeats);
 }
 
 /// What finer elements change. @throws InputError where the scene has none.
@@ -280,8 +288,7 @@ std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const Ou
                                                 const RunHooks& hooks, std::vector<std::string>& plan) {
   for (double before = std::numeric_limits<double>::infinity();;) {
     const Scene tight = with_a_digit_more(flown);
-    const bool is_kept = hooks.kept != nullptr && hooks.kept->scene == to_toml(tight);
-    Run finer = is_kept ? std::exchange(*hooks.kept, {}).run : run_once(tight, hooks, 0, bearable_steps(run));
+    Run finer = fly(tight, hooks, 0, bearable_steps(run));
     std::vector<OutputDifference> differences = compare_outputs(run.outputs, finer.outputs, flown.outputs, floors);
     const double error = largest(differences);
     if (!(error < std::exchange(before, error) / 5)) --asked.digits;
@@ -343,18 +350,36 @@ ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::v
       return unknown;
     }
   };
+  std::optional<Beyond> beyond;
+  std::string beyond_what;
+  bool has_beyond = true;
+  // The longest of the repeats: it is flown while others are, and anew where these change the run.
+  const auto look_beyond = [&] {
+    if (!has_beyond || std::exchange(beyond_what, to_toml(flown)) == beyond_what) return;
+    give_up_ahead(hooks);
+    const double found = measured("truncation", [&] {
+      beyond = modes_beyond(scene, flown, still, budget, hooks);
+      if (beyond) fly_ahead(beyond->scene, hooks, 0, bearable_steps(run));
+      return 0.0;
+    });
+    has_beyond = !std::isnan(found);
+  };
+  look_beyond();
   budget.linearisation = measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
+  look_beyond();
   budget.time = measured("time", [&] {
     const Settling asked{scene.tolerance / 3, 2};  // a third: there are other errors
     return m.enter(&OutputErrors::time, {settle_time_error(flown, run, m.repeats.floors, asked, hooks, m.plan)});
   });
   scene.integrator_tolerance = flown.integrator_tolerance;
-  budget.truncation = measured("truncation", [&] {
-    return m.enter(&OutputErrors::truncation, truncation_of(scene, run, flown, still, budget, m.repeats));
-  });
+  look_beyond();
   budget.discretisation = measured("discretisation", [&] {
     return m.enter(&OutputErrors::discretisation, discretisation_of(scene, run, flown, m.repeats));
   });
+  if (has_beyond)
+    budget.truncation = measured("truncation", [&] {
+      return m.enter(&OutputErrors::truncation, truncation_of(std::move(beyond), run, flown, budget.time, m.repeats));
+    });
   budget.measured = !hooks.stopped();
   for (const std::string& line : budget.missing) plan.push_back("error budget: " + line);
   return budget;

@@ -5,6 +5,7 @@
 #include "apps/model/prepared_body.hpp"
 #include "apps/model/static_shapes.hpp"
 #include "apps/simulate/error_budget.hpp"
+#include "apps/simulate/flights_ahead.hpp"
 #include "fem/base/check.hpp"
 #include "fem/booms/solid_boom.hpp"
 
@@ -157,7 +158,21 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
                                      std::vector<std::string>& plan) {
   Scene with_few = with_candidates(scene, fewest, candidates_, hooks);
   Run few = run_once(with_few, hooks);
+  const auto made_ready = [&](int candidates) {
+    open = with_candidates(scene, candidates, candidates, hooks);
+    all = with_a_digit_more(as_flown(open, few));  // errors of its time are no part of differences
+    all.integrator_tolerance = std::max(all.integrator_tolerance, least_tolerance);
+    if (is_costly_by_its_formulation(all)) {
+      all.formulation = "relative", all.integrator = "auto";
+      all.integrator_tolerance = std::max(all.tolerance / 10, least_tolerance);
+    }
+  };
+  const auto bearable = [&few] { return 2 * bearable_steps(few); };  // of a tighter tolerance
   if (!std::exchange(is_timed_, true)) {
+    if (candidates_ > fewest) {
+      made_ready(candidates_);
+      fly_ahead(all, hooks, 0, bearable());
+    }
     const Settling asked{scene.tolerance / 3, 6};
     try {
       settle_time_error(with_few, few, floors_of(scene, few.bodies), asked, hooks, plan);
@@ -167,25 +182,18 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
     scene.integrator_tolerance = with_few.integrator_tolerance;
   }
   const auto run = [&](int candidates, long max_steps) {
-    open = with_candidates(scene, candidates, candidates, hooks);
-    all = with_a_digit_more(as_flown(open, few));  // errors of its time are no part of differences
-    all.integrator_tolerance = std::max(all.integrator_tolerance, least_tolerance);
-    if (is_costly_by_its_formulation(all)) {
-      all.formulation = "relative", all.integrator = "auto";
-      all.integrator_tolerance = std::max(all.tolerance / 10, least_tolerance);
-    }
-    return run_once(all, hooks, 0, max_steps);
+    made_ready(candidates);
+    return fly(all, hooks, 0, max_steps);
   };
-  const long bearable = 2 * bearable_steps(few);  // of a tighter tolerance
   for (; candidates_ > fewest && !hooks.stopped(); candidates_ /= 2) {
     try {
-      Run made = run(candidates_, bearable);
-      costly_ = costly_ || made.motion.summary.steps > bearable / 3;  // with more of them it will not be bearable
+      Run made = run(candidates_, bearable());
+      costly_ = costly_ || made.motion.summary.steps > bearable() / 3;  // with more of them it will not be bearable
       return made;
     } catch (const NumericalError&) {
       costly_ = true;
       plan.push_back(
-          fmt::format("modes: a run with {} of each body fails or takes more than {} steps", candidates_, bearable));
+          fmt::format("modes: a run with {} of each body fails or takes more than {} steps", candidates_, bearable()));
       if (candidates_ / 2 <= chosen_from_) return {};
     }
   }
@@ -242,9 +250,9 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
   const auto error_with = [&](size_t count) {
     try {
       const Scene tried = with_first(all, list, count);
-      Run run = run_once(tried, hooks, 0, bearable_steps(*reference));
+      Run run = fly(tried, hooks, 0, bearable_steps(*reference));
       const double e = largest(compare_outputs(without_coordinates(run.outputs), wanted, scene.outputs, floors));
-      if (e <= bearable && hooks.kept != nullptr) *hooks.kept = {to_toml(tried), std::move(run)};
+      if (e <= bearable) keep_flown(tried, std::move(run), hooks);
       return e;
     } catch (const NumericalError&) {
       return unknown;
@@ -264,20 +272,25 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
   size_t enough = moved, too_few = std::min(too_few_, moved), next = moving_by(scene.tolerance / 10);
   if (too_few > 0) next = too_few + too_few / 8;
   double error = 0, error_of_fewer = 0;
-  const auto is_settled = [&] { return enough <= too_few + enough / 16; };  // a trial costs more than these would save
+  const auto is_settled = [&] { return enough <= too_few + enough / 8; };  // a trial costs more than these would save
+  const auto between = [&](size_t low) { return static_cast<size_t>(std::sqrt(static_cast<double>(low * enough))); };
   for (int i = 0; i < most_trials && !is_settled() && !hooks.stopped(); ++i) {
-    const size_t count = std::min(next, enough - 1);
+    const size_t count = std::min(next, enough - 1), if_too_few = between(count + 1);
+    if (if_too_few > count && if_too_few < enough)
+      fly_ahead(with_first(all, list, if_too_few), hooks, 0, bearable_steps(*reference));
     const double e = error_with(count);
-    const bool is_enough = e <= bearable;
-    if (is_enough)
+    next = if_too_few;
+    if (e <= bearable) {
       enough = count, error = e;
-    else
+      give_up_ahead(hooks);
+      next = expected(count, e);
+      if (next >= enough) break;
+      if (next < too_few) next = between(too_few);
+    } else {
       too_few = count + 1, error_of_fewer = e;
-    next = expected(count, e);
-    if (is_enough && next >= enough) break;
-    const bool has_failed_before = !is_enough && i > 0;  // then the proportion does not hold
-    if (has_failed_before || next < too_few || next >= enough) next = (enough + too_few) / 2;
+    }
   }
+  give_up_ahead(hooks);
   kept_ = enough;
   const Scene chosen = with_first(open, list, enough);
   for (const size_t i : open_) {

@@ -2,6 +2,7 @@
 
 #include "apps/base/deflection.hpp"
 #include "apps/simulate/error_budget.hpp"
+#include "apps/simulate/flights_ahead.hpp"
 #include "apps/simulate/multipliers_flight.hpp"
 #include "apps/simulate/planner.hpp"
 #include "apps/simulate/steady_motion.hpp"
@@ -232,8 +233,8 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
   r.scene = given;
   validate(r.scene);
   r.scene = with_steady_motions(r.scene);
-  KeptFlight kept;
-  if (r.scene.error_budget) hooks.kept = &kept;
+  FlightsAhead ahead;
+  hooks.ahead = &ahead;
   Planner planner(r.scene);
   planner.choose(r.scene, hooks, r.plan);
   RunHooks of_run = hooks;

@@ -43,7 +43,7 @@ struct RunResult {
 };
 
 struct Run;
-struct KeptFlight;
+class FlightsAhead;
 
 /// Beside a run.
 struct RunHooks {
@@ -51,7 +51,7 @@ struct RunHooks {
   std::function<void(double time, double duration)> progress{};
   double checkpoint_every = 10;      // wall time between two checkpoints [s]
   PreparedBodies* bodies = nullptr;  // that other runs have made; nullptr: this one makes its own
-  KeptFlight* kept = nullptr;        // of a choice of modes: a repeat of the same scene takes it
+  FlightsAhead* ahead = nullptr;     // that were flown before they are asked for; nullptr: none
   /// Told at every checkpoint of a flight: the run so far, whose rows begin with row `first` of the flight. Its end is
   /// the state there. Row 0 comes again where the flight begins anew.
   std::function<void(Run so_far, size_t first)> checkpoint{};
@@ -92,12 +92,6 @@ struct Run {
 
   std::shared_ptr<const Tree> tree;  // of the joints that close no loop
   std::vector<std::string> notes;    // for the plan
-};
-
-/// A flight that may be wanted again.
-struct KeptFlight {
-  std::string scene;  // as to_toml writes it; empty: there is none
-  Run run;
 };
 
 /// What a scene asks of an integrator; `chosen`: the method where it leaves the choice. `max_steps` as of run_once.

@@ -1,6 +1,7 @@
 #include "apps/simulate/verify.hpp"
 
 #include "apps/simulate/error_budget.hpp"
+#include "apps/simulate/flights_ahead.hpp"
 
 #include <algorithm>
 #include <functional>
@@ -56,14 +57,17 @@ std::vector<ReferenceCheck> reference_checks(const RunResult& r, const RunHooks&
   scene.integrator_tolerance = 0;
   OutputFloors floors = floors_of(r.scene, r.bodies);
   RunHooks quiet;
-  quiet.interrupt = hooks.interrupt, quiet.bodies = hooks.bodies;
+  quiet.interrupt = hooks.interrupt, quiet.bodies = hooks.bodies, quiet.ahead = hooks.ahead;
   std::vector<ReferenceCheck> checks;
-  for (const Reference& reference : references(scene, r.trajectory.summary.method, quiet)) {
+  const std::vector<Reference> all = references(scene, r.trajectory.summary.method, quiet);
+  for (const Reference& reference : all) {
     if (hooks.stopped()) break;
+    if (const Reference* next = &reference + 1; next != all.data() + all.size())
+      fly_ahead(next->scene, quiet, next->refine);
     ReferenceCheck check;
     check.what = reference.what;
     try {
-      const Run run = run_once(reference.scene, quiet, reference.refine);
+      const Run run = fly(reference.scene, quiet, reference.refine);
       check.method = run.motion.summary.method;
       const auto of = [&](const OutputTable& table) {
         return reference.other_basis ? without_coordinates(table) : table;
