@@ -233,6 +233,10 @@ TableReader TableReader::in_place_of(const Value& other, std::string path) {
   return table;
 }
 
+TableReader TableReader::table_in(std::string_view key, size_t i) {
+  return TableReader(find(key)->items.at(i), fmt::format("{}[{}]", path(key), i), *faults_);
+}
+
 std::vector<TableReader> TableReader::tables(std::string_view key) {
   std::vector<TableReader> result;
   const Value* array = find(key);

@@ -53,6 +53,9 @@ class TableReader {
   /// returned is empty: the fault names the keys that are asked of it.
   std::optional<TableReader> table(std::string_view key, bool required = false);
 
+  /// Entry i of the array of a key, which is a table.
+  TableReader table_in(std::string_view key, size_t i);
+
   /// The tables of an array of tables; absent: empty.
   std::vector<TableReader> tables(std::string_view key);
 

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 namespace flexboom {
 namespace {
@@ -28,16 +29,17 @@ void read_table(TableReader table, Reading& reading, CourseScene& course) {
     read_keys(table, reading, course.table.emplace(), time_table_keys);
 }
 
-/// `item` is the value of `key`, or an entry of it.
-CourseScene course_at(KeyReader& reader, std::string_view key, const Value& item) {
+/// Of the value of `key`, or of entry i of it.
+CourseScene course_at(KeyReader& reader, std::string_view key, std::optional<size_t> i = {}) {
+  const Value& item = i ? value_at(reader, key)->items[*i] : *value_at(reader, key);
   CourseScene course;
   if (is_number(item)) {
     course.expression = fmt::format("{}", item.number);
   } else if (item.kind == Value::Kind::text) {
     course.expression = item.text;
     if (item.text.empty()) reader.table().fault(key, "is empty; it must be an expression of t");
-  } else if (item.kind == Value::Kind::table && &item == value_at(reader, key)) {
-    read_table(*reader.table().table(key), reader.reading(), course);
+  } else if (item.kind == Value::Kind::table) {
+    read_table(i ? reader.table().table_in(key, *i) : *reader.table().table(key), reader.reading(), course);
   } else {
     reader.table().fault(key, "must be a number, an expression of t, or a table { time = [...], value = [...] }");
   }
@@ -47,23 +49,23 @@ CourseScene course_at(KeyReader& reader, std::string_view key, const Value& item
 }  // namespace
 
 void read_course(KeyReader& reader, std::string_view key, CourseScene& course) {
-  if (const Value* value = value_at(reader, key)) course = course_at(reader, key, *value);
+  if (value_at(reader, key)) course = course_at(reader, key);
 }
 
 void read_course(KeyReader& reader, std::string_view key, std::vector<CourseScene>& courses) {
   const Value* value = value_at(reader, key);
   if (!value) return;
-  if (value->kind != Value::Kind::array) return courses.assign(1, course_at(reader, key, *value));
-  for (const Value& item : value->items) courses.push_back(course_at(reader, key, item));
+  if (value->kind != Value::Kind::array) return courses.assign(1, course_at(reader, key));
+  for (size_t i = 0; i < value->items.size(); ++i) courses.push_back(course_at(reader, key, i));
 }
 
 void read_course(KeyReader& reader, std::string_view key, std::array<CourseScene, 3>& three) {
   const Value* value = value_at(reader, key);
   if (!value) return;
   if (value->kind != Value::Kind::array || value->items.size() != 3)
-    return reader.table().fault(key, "must be an array of 3 numbers or expressions of t, one per axis");
+    return reader.table().fault(key, "must be an array of 3 numbers, expressions of t or tables, one per axis");
   for (size_t i = 0; i < 3; ++i) {
-    three[i] = course_at(reader, key, value->items[i]);
+    three[i] = course_at(reader, key, i);
     if (is_number(value->items[i]) && value->items[i].number == 0) three[i] = {};
   }
 }

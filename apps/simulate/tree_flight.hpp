@@ -48,8 +48,8 @@ void fly_until_settled(const Scene&, const Multibody&, std::vector<LargestStiffe
 /// at any output. `max_steps` > 0 bounds its cost. @throws InputError, NumericalError.
 Run fly_tree(const Scene&, std::vector<PreparedBody>, const RunHooks&, long max_steps);
 
-/// Adds where the scene's functions of time are not smooth. Those of an expression are not known: no step passes an
-/// output then, so that a pulse is not stepped over.
+/// Adds where the scene's functions of time are not smooth, and where steps must end so that they overlook nothing of
+/// them: a pulse, or a vibration.
 void set_corners(const Scene&, IntegratorOptions&);
 
 /// Where the mass centre of all bodies lies, inertial axes [m].

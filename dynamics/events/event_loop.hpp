@@ -7,6 +7,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -92,11 +95,13 @@ class Flight : protected StopMotion, protected LawMotion {
           fmt::format("{} steps were not enough: t = {:.9g} s of {:g} s", steps_, t, options_.duration));
     if (!next_y_.allFinite()) throw NumericalError(fmt::format("the state is not finite at t = {:.9g} s", t));
     t_ = t, y_.swap(next_y_);
+    const std::optional<double> corner = corner_reached();
+    if (corner) t_ = *corner;
     write_outputs();
     observe(y_);
     const bool met = contacts_.update(*this, t_, result_.events), changed = laws_.update(*this, t_, result_.events);
     if (changed) observe(y_);  // sudden losses are large at once
-    if (met || changed || at_corner()) {
+    if (met || changed || corner) {
       restart();
       ++result_.summary.restarts;
     }
@@ -126,14 +131,19 @@ class Flight : protected StopMotion, protected LawMotion {
   double limit() const {
     const double reached = t_ + round_off();
     double end = options_.duration;
-    const auto corner = std::upper_bound(options_.corners.begin(), options_.corners.end(), reached);
-    if (corner != options_.corners.end()) end = std::min(end, *corner);
-    if (const double output = output_time(); options_.step_to_outputs && output > reached) end = std::min(end, output);
+    const auto corner = std::ranges::upper_bound(options_.corners, reached);
+    if (corner != options_.corners.end()) end = std::min(end, std::nextafter(*corner, t_));
+    const auto other = std::ranges::upper_bound(options_.step_ends, reached);
+    if (other != options_.step_ends.end()) end = std::min(end, *other);
     return end;
   }
 
-  bool at_corner() const {
-    return std::ranges::any_of(options_.corners, [this](double c) { return std::abs(c - t_) <= round_off(); });
+  /// The corner that t_ has come to, or nothing. A step ends before it, the next one begins on it: what jumps there has
+  /// one value within a step.
+  std::optional<double> corner_reached() const {
+    const auto corner = std::ranges::upper_bound(options_.corners, t_);
+    if (corner == options_.corners.end() || *corner > t_ + round_off()) return {};
+    return *corner;
   }
 
   double round_off() const { return 1e-14 * options_.duration; }

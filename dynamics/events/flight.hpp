@@ -55,8 +55,8 @@ struct FlightOptions {
   /// Times where forces or prescribed motions are not smooth, ascending [s]: a step ends there and the method starts
   /// anew.
   std::vector<double> corners{};
-  /// No step passes an output: what forces do for as long as that is not stepped over.
-  bool step_to_outputs = false;
+  /// No step passes these times, ascending [s]: what forces do between them no step overlooks.
+  std::vector<double> step_ends{};
   long max_steps = 200'000'000;
   const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
   std::function<void(double time, double duration)> progress;  // called now and then

@@ -143,6 +143,68 @@ TimeCourse smooth(const Manoeuvre& m) {
 
 }  // namespace
 
+namespace {
+
+/// Samples of a function at equal distances.
+struct Sampled {
+  std::vector<double> value;
+  double negligible = 0;
+
+  /// Does the polynomial through five of those from first to last follow the others?
+  bool is_smooth(size_t first, size_t last) const {
+    constexpr double weights[] = {1, -4, 6, -4, 1}, of_range = 1e-3;
+    const size_t quarter = (last - first) / 4;
+    const auto [low, high] = std::minmax_element(value.begin() + static_cast<std::ptrdiff_t>(first),
+                                                 value.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+    const double allowed = std::max(of_range * (*high - *low), negligible);
+    for (size_t i = first + 1; i < last; ++i) {
+      if ((i - first) % quarter == 0) continue;
+      double sum = 0, weight = 0;
+      for (size_t j = 0; j < 5; ++j) {
+        const size_t node = first + j * quarter;
+        const double w = weights[j] / (static_cast<double>(i) - static_cast<double>(node));
+        sum += w * value[node], weight += w;
+      }
+      if (!(std::abs(sum / weight - value[i]) <= allowed)) return false;
+    }
+    return true;
+  }
+};
+
+void add_pieces(const std::vector<Sampled>& functions, size_t first, size_t last, std::vector<size_t>& ends) {
+  const auto is_smooth = [&](const Sampled& f) { return f.is_smooth(first, last); };
+  if (last - first <= 4 || std::ranges::all_of(functions, is_smooth)) {
+    ends.push_back(last);
+    return;
+  }
+  const size_t middle = (first + last) / 2;
+  add_pieces(functions, first, middle, ends);
+  add_pieces(functions, middle, last, ends);
+}
+
+}  // namespace
+
+std::vector<double> smooth_pieces(const std::vector<std::function<double(double)>>& functions, double duration,
+                                  int samples, double negligible) {
+  if (functions.empty()) return {};
+  const auto time = [&](size_t i) { return duration * static_cast<double>(i) / samples; };
+  std::vector<Sampled> sampled;
+  for (const std::function<double(double)>& f : functions) {
+    Sampled& s = sampled.emplace_back();
+    double largest = 0;
+    for (size_t i = 0; i <= static_cast<size_t>(samples); ++i) {
+      s.value.push_back(f(time(i)));
+      if (std::isfinite(s.value.back())) largest = std::max(largest, std::abs(s.value.back()));
+    }
+    s.negligible = negligible * largest;
+  }
+  std::vector<size_t> ends;
+  add_pieces(sampled, 0, static_cast<size_t>(samples), ends);
+  std::vector<double> times;
+  for (const size_t i : ends) times.push_back(time(i));
+  return times;
+}
+
 TimeCourse time_expression(const std::string& text) {
   TimeCourse c;
   c.function = split([e = Expression(text)](double t) { return e.at(t); });

@@ -2,6 +2,7 @@
 
 #include "dynamics/model/multibody.hpp"
 
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -16,7 +17,7 @@ struct TimeCourse {
   double end = std::numeric_limits<double>::infinity();  // asked outside [begin, end] it throws InputError
 };
 
-/// A formula of t (`Expression`). Its corners, if it has any, are not found.
+/// A formula of t (`Expression`). It has no corners here: Expression::corners finds those of a duration.
 /// @throws InputError with the column and the nearest known name.
 TimeCourse time_expression(const std::string& text);
 
@@ -46,5 +47,12 @@ struct Manoeuvre {
 /// its third derivative (smooth) jumps, from start to end.
 /// @throws InputError for an unknown profile or limits that are not positive.
 TimeCourse rest_to_rest(const Manoeuvre&);
+
+/// Ends of pieces of [0, duration], ascending [s]: on each piece a polynomial of degree 4 follows every function, to a
+/// thousandth of its range there or `negligible` of its largest size. Seen at `samples` times (a power of 2, 4 at
+/// least) at equal distances; no piece is shorter than four of these. What looks at five points of a piece or more sees
+/// all that these functions do.
+std::vector<double> smooth_pieces(const std::vector<std::function<double(double)>>&, double duration, int samples,
+                                  double negligible);
 
 }  // namespace flexboom

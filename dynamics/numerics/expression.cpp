@@ -213,6 +213,52 @@ std::string suggestion(const std::string& token) {
   throw InputError(fmt::format("expression \"{}\", column {}: {}", text, column, what));
 }
 
+/// A node that is slope * t + value, where that is known.
+struct Line {
+  double slope = 0, value = 0;
+  bool is_known = false;
+};
+
+Line line_of(const Operation& o, const Line* x) {
+  const bool both = x[0].is_known && (o.arguments < 2 || x[1].is_known);
+  if (!both || o.arguments > 2) return {};
+  const auto is_constant = [&](int k) { return k >= o.arguments || x[k].slope == 0; };
+  if (is_constant(0) && is_constant(1)) {
+    const Jet values[] = {{x[0].value}, {x[1].value}, {}};
+    return {0, o.at(values).v, true};
+  }
+  if (o.name == "+" && o.arguments == 1) return x[0];
+  if (o.name == "-" && o.arguments == 1) return {-x[0].slope, -x[0].value, true};
+  if (o.name == "+") return {x[0].slope + x[1].slope, x[0].value + x[1].value, true};
+  if (o.name == "-") return {x[0].slope - x[1].slope, x[0].value - x[1].value, true};
+  if (o.name == "*" && is_constant(0)) return {x[0].value * x[1].slope, x[0].value * x[1].value, true};
+  if (o.name == "*" && is_constant(1)) return {x[0].slope * x[1].value, x[0].value * x[1].value, true};
+  if (o.name == "/" && is_constant(1)) return {x[0].slope / x[1].value, x[0].value / x[1].value, true};
+  return {};
+}
+
+/// Has a node sides, which change where its first argument crosses the second, or zero? "==" and "!=" are on another
+/// side for one moment, which does nothing.
+bool has_sides(const Operation& o) {
+  constexpr std::string_view names[] = {"<", ">", "<=", ">=", "abs", "sign", "step", "min", "max"};
+  return std::ranges::find(names, o.name) != std::end(names);
+}
+
+bool compares_two(const Operation& o) { return o.arguments == 2; }
+bool gives_flag(const Operation& o) { return o.precedence == mu::prCMP || o.name == "step"; }
+
+/// Adds up to `most` first times of other sides within (a, b]: round-off may make many. side_at(t): what compares.
+template <class SideAt>
+void add_changes(const SideAt& side_at, double a, double b, size_t most, std::vector<double>& times) {
+  const auto at_b = side_at(b);
+  for (auto at_a = side_at(a); at_a != at_b && most > 0; at_a = side_at(a), --most) {
+    double same = a, other = b;
+    for (double middle = 0.5 * (same + other); same < middle && middle < other; middle = 0.5 * (same + other))
+      (side_at(middle) == at_a ? same : other) = middle;
+    times.push_back(a = other);
+  }
+}
+
 }  // namespace
 
 Expression::Expression(const std::string& text) {
@@ -231,10 +277,13 @@ Expression::Expression(const std::string& text) {
   }
 }
 
-std::array<double, 3> Expression::at(double t) const {
-  std::array<Jet, max_nodes> value;  // NOLINT: written before it is read
-  for (size_t i = 0; i < nodes_.size(); ++i) {
-    const Node& n = nodes_[i];
+namespace {
+
+using Jets = std::array<Jet, max_nodes>;
+
+void evaluate(const std::vector<Expression::Node>& nodes, double t, Jets& value) {
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    const Expression::Node& n = nodes[i];
     if (n.operation >= 0) {
       Jet x[3];
       for (int k = 0; k < operations[n.operation].arguments; ++k)
@@ -244,8 +293,63 @@ std::array<double, 3> Expression::at(double t) const {
       value[i] = n.operation == -1 ? Jet{t, 1, 0} : Jet{n.constant, 0, 0};
     }
   }
+}
+
+}  // namespace
+
+std::array<double, 3> Expression::at(double t) const {
+  Jets value;  // NOLINT: written before it is read
+  evaluate(nodes_, t, value);
   const Jet& r = value[static_cast<size_t>(result_)];
   return {r.v, r.d, r.dd};
+}
+
+std::vector<double> Expression::corners(double begin, double end, int samples) const {
+  std::vector<Line> lines(nodes_.size());
+  std::vector<size_t> curved;  // nodes whose sides change where no line says
+  std::vector<double> times;
+  const auto argument = [this](size_t i, size_t k) { return static_cast<size_t>(nodes_[i].argument[k]); };
+  const auto side_of = [&](size_t i, const Jets& value) {  // zero belongs to that side which the result has there
+    if (gives_flag(operations[nodes_[i].operation])) return value[i].v != 0;
+    return value[argument(i, 0)].v > (compares_two(operations[nodes_[i].operation]) ? value[argument(i, 1)].v : 0);
+  };
+  Jets value;  // NOLINT: written before it is read
+  for (size_t i = 0; i < nodes_.size(); ++i) {
+    const Node& n = nodes_[i];
+    if (n.operation < 0) {
+      lines[i] = n.operation == -1 ? Line{1, 0, true} : Line{0, n.constant, true};
+      continue;
+    }
+    const Operation& o = operations[n.operation];
+    const Line x[] = {lines[argument(i, 0)], lines[argument(i, 1)]};
+    lines[i] = line_of(o, x);
+    if (!has_sides(o)) continue;
+    const Line other = compares_two(o) ? x[1] : Line{0, 0, true};
+    if (!x[0].is_known || !other.is_known) {
+      curved.push_back(i);
+      continue;
+    }
+    const double zero = (other.value - x[0].value) / (x[0].slope - other.slope), near = 1e-12 * std::abs(zero) + 1e-300;
+    if (!(begin < zero && zero < end)) continue;
+    const auto side_at = [&](double t) {
+      evaluate(nodes_, t, value);
+      return side_of(i, value);
+    };
+    add_changes(side_at, zero - near, zero + near, 1, times);
+  }
+  const auto sides_at = [&](double t) {
+    evaluate(nodes_, t, value);
+    std::vector<bool> sides;
+    for (const size_t i : curved) sides.push_back(side_of(i, value));
+    return sides;
+  };
+  const auto sample = [&](int k) { return begin + k * (end - begin) / samples; };
+  for (int k = 1; k <= samples && !curved.empty(); ++k)
+    add_changes(sides_at, sample(k - 1), sample(k), curved.size(), times);
+  std::erase_if(times, [&](double t) { return !(begin < t && t < end); });
+  std::ranges::sort(times);
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  return times;
 }
 
 std::vector<std::string> expression_names() {

@@ -18,6 +18,11 @@ class Expression {
   /// corner of abs, min, max, if or a comparison the derivative is that of the branch taken.
   std::array<double, 3> at(double t) const;
 
+  /// The first times, within (begin, end) and ascending, at which a comparison, abs, sign, step, min or max is on
+  /// another side than before. All of them where what is compared is linear in t; else those between two of `samples`
+  /// times at equal distances that are on different sides.
+  std::vector<double> corners(double begin, double end, int samples) const;
+
   /// One operation on earlier results.
   struct Node {
     int operation = -1;  // row of the table of operations; -1: t, -2: a constant

@@ -52,7 +52,8 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     frame_ = std::make_unique<FlightFrame>(equations_, start, t_);
     start_on_constraints(frame_->seen(start));
     begin_contacts();
-    equations_.make_consistent(t_, y_, y_dot_, memory_);
+    const double soon = t_ + 1e-14 * options.duration;  // what jumps at the start has jumped
+    equations_.make_consistent(soon, y_, y_dot_, memory_);
     const double shaking = std::max(balance_of(equations_, y_, memory_).shaking(), options_.largest.shaking);
     scales_ = std::make_unique<StateScales>(equations_, y_, y_dot_, shaking, local_share * options.tolerance,
                                             options.duration);

@@ -218,14 +218,14 @@ TEST(BudgetOfATree, GeometricStiffnessThatCountsIsInTheRunThatIsKept) {
   scene.error_budget = true;
   const RunResult left_open = run_scene(scene, {});
   EXPECT_EQ(left_open.tree->stiffening(1), Stiffening::on);
-  EXPECT_LT(left_open.budget.time, 1e-6);  // no part of what stiffness changes
+  EXPECT_LT(left_open.budget.time, 1e-5);  // no part of what stiffness changes
   EXPECT_LT(left_open.budget.linearisation, 1e-4);
   for (BodyScene& b : scene.bodies)
     if (!b.stiffening.empty()) b.stiffening = "off";
   const RunResult off = run_scene(scene, {});
   EXPECT_EQ(off.tree->stiffening(1), Stiffening::off);
   EXPECT_GT(off.budget.linearisation, 1e-3);
-  EXPECT_LT(off.budget.time, 1e-6);
+  EXPECT_LT(off.budget.time, 1e-5);
 }
 
 /// A repeat that fails costs its part of the budget, not the run: the tighter one where the tolerance nears round-off.

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <initializer_list>
 #include <numbers>
 
 namespace flexboom {
@@ -125,6 +127,64 @@ TEST(TimeTable, CubicSplineReproducesCubicsAndConvergesToFourthOrder) {
     return error;
   };
   EXPECT_NEAR(std::log2(worst(40) / worst(80)), 4, 0.3);
+}
+
+/// The next number.
+double after(double t) { return std::nextafter(t, 100.0); }
+
+TEST(Expression, CornersAreWhereSidesChange) {
+  const auto corners = [](const char* text, double begin = 0, double end = 10) {
+    return Expression(text).corners(begin, end, 64);
+  };
+  const auto of = [](std::initializer_list<double> times) { return std::vector<double>(times); };
+  EXPECT_EQ(corners("(t > 1.25)*(t < 1.2500001)"), of({after(1.25), 1.2500001})) << "much closer than samples";
+  EXPECT_EQ(corners("if(3 - 2*t/4 >= 1/2, t, 0)"), of({after(5)}));
+  EXPECT_EQ(corners("step(t - pi) + 3"), of({pi}));
+  EXPECT_EQ(corners("max(t, 2 - t) + min(t, 4)"), of({after(1), after(4)}));
+  EXPECT_EQ(corners("sin(t) + t^3 + (2 < 3)"), of({}));
+  EXPECT_EQ(corners("(t < 11)*(t > 0)"), of({})) << "outside";
+  EXPECT_EQ(corners("t == 3"), of({})) << "a moment";
+  EXPECT_EQ(corners("(t < 2)*(t < 2)"), of({2}));
+  const std::vector<double> bounces = corners("abs(sin(pi*t))", 0.5, 3.5);
+  EXPECT_LE(corners("max(sin(t)^2 + cos(t)^2, 1)").size(), 64u) << "round-off takes many sides";
+  EXPECT_EQ(corners("(sin(t) > 0.5) + (sin(t) > 0.51)", 0, 1.5).size(), 2u) << "between two samples";
+  ASSERT_EQ(bounces.size(), 3u);
+  for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(bounces[i], static_cast<double>(i) + 1, 1e-15);
+}
+
+TEST(SmoothPieces, PolynomialsOfDegreeFourFollow) {
+  constexpr double duration = 20;
+  constexpr int samples = 4096;
+  const std::vector<std::function<double(double)>> functions = {
+      [](double t) { return std::exp(-std::pow((t - 5.25) / 0.02, 2)); }, [](double t) { return 1e6 * std::sin(t); }};
+  EXPECT_TRUE(smooth_pieces({}, duration, samples, 0).empty());
+  EXPECT_EQ(smooth_pieces({[](double t) { return t * t; }}, duration, samples, 0), std::vector<double>{duration});
+  const std::vector<double> pieces = smooth_pieces(functions, duration, samples, 1e-9);
+  EXPECT_EQ(pieces.back(), duration);
+  EXPECT_LT(pieces.size(), 60u);
+  double begin = 0, longest = 0;
+  for (const double end : pieces) {
+    longest = std::max(longest, end - begin);
+    const bool is_shortest = end - begin < 4.5 * duration / samples;  // of these nothing is promised
+    for (const auto& f : functions) {
+      if (is_shortest) continue;
+      double low = f(begin), high = low, worst = 0;
+      for (int k = 0; k <= 100; ++k) {
+        const double x = k / 25.0, t = begin + x * (end - begin) / 4;
+        double p = 0;  // of Lagrange
+        for (int i = 0; i < 5; ++i) {
+          double l = f(begin + i * (end - begin) / 4);
+          for (int j = 0; j < 5; ++j)
+            if (j != i) l *= (x - j) / (i - j);
+          p += l;
+        }
+        low = std::min(low, f(t)), high = std::max(high, f(t)), worst = std::max(worst, std::abs(p - f(t)));
+      }
+      EXPECT_LT(worst, 2e-3 * (high - low) + 1e-9) << begin << " to " << end;  // between samples, too
+    }
+    begin = end;
+  }
+  EXPECT_GT(longest, 1);
 }
 
 TEST(TimeTable, FewPointsAreALineAndAParabola) {
