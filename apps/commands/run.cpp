@@ -278,7 +278,8 @@ int run_command(const RunArguments& a, const CommonOptions& common) {
   const RunResult result = run_into(results, scene, a, common);
   const IntegrationSummary& s = result.trajectory.summary;
   const std::string wrong =
-      is_balanced(s) ? "" : fmt::format("{}: the motion in {} is wrong", balances(s), folder.string());
+      is_balanced(s) ? ""
+                     : fmt::format("{}: the motion in {}, or its energies, are wrong", balances(s), folder.string());
   if (!wrong.empty()) results.fail(wrong);
   if (common.json) {
     fmt::print("{}\n", results.summary().dump(2));

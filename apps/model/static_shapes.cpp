@@ -26,7 +26,8 @@ std::vector<std::string> static_shapes_at(const std::string& node_set) {
 std::vector<std::string> static_shapes_of_loads(const Scene& scene, const BodyScene& body) {
   std::vector<std::string> sets, shapes;
   const auto note = [&](const PlaceScene& place) {
-    if (place.body != body.name || place.marker.empty() || place.marker == body.clamp) return;
+    const bool is_held = place.marker == body.clamp && body.basis.name != "mean-axis";
+    if (place.body != body.name || place.marker.empty() || is_held) return;
     if (std::ranges::find(sets, place.marker) == sets.end()) sets.push_back(place.marker);
   };
   for (const JointScene& joint : scene.joints) note(joint.a), note(joint.b);

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -276,10 +277,26 @@ double linearisation_error(const Scene& scene, Scene& flown, Run& run, Measuring
 
 }  // namespace
 
+namespace {
+
+/// About the mass centre.
+double least_inertia(const ReducedBody& body) {
+  const Eigen::Vector3d c = body.mc0 / body.m;
+  const Eigen::Matrix3d about_centre =
+      body.J0 - body.m * (c.squaredNorm() * Eigen::Matrix3d::Identity() - c * c.transpose());
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(about_centre, Eigen::EigenvaluesOnly).eigenvalues()[0];
+}
+
+}  // namespace
+
 OutputFloors floors_of(const Scene& scene, const std::vector<PreparedBody>& bodies) {
   OutputFloors floors{scene.tolerance};
   for (const PreparedBody& p : bodies)  // the largest radius of gyration: what lengths of the scene are like
     floors.length = std::max(floors.length, std::sqrt(p.body.J0.trace() / p.body.m));
+  for (const PreparedBody& p : bodies) {
+    const double least = p.body.n() == 0 ? least_inertia(p.body) : 0;
+    if (least > 0 && !(floors.inertia > 0 && floors.inertia <= least)) floors.inertia = least;
+  }
   for (const std::string& text : scene.absolute) floors.absolute.push_back(absolute_error(text));
   return floors;
 }

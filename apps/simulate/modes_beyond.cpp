@@ -118,6 +118,7 @@ Scene with_more_modes(Scene scene, const ModesBeyond& more, const RunHooks& hook
     b.modes = 2 * (per_plane + more.of(per_plane));
     b.directions = "all";
     b.shapes.clear();
+    if (b.basis.name == "mean-axis") b = with_static_shapes(b, static_shapes_of_loads(scene, b));
   }
   return scene;
 }

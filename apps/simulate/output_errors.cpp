@@ -70,11 +70,11 @@ VectorXd values_at(const OutputTable& table, Index row, const ColumnPlaces& colu
   return r;
 }
 
-/// The largest value of each unit, over all outputs of a table.
+/// The largest value of each unit, over all outputs of a table; of "J" the largest kinetic energy.
 std::map<std::string_view, double> largest_of_units(const OutputTable& table) {
   std::map<std::string_view, double> r;
   for (size_t i = 0; i < table.names.size(); ++i) {
-    const std::string_view unit = unit_of(output_of_column(table.names[i]));
+    const std::string_view unit = table.names[i] == "energy.kinetic" ? "J" : unit_of(output_of_column(table.names[i]));
     if (unit.empty() || table.values.rows() == 0) continue;
     r[unit] = std::max(r[unit], table.values.col(static_cast<Index>(i)).cwiseAbs().maxCoeff());
   }
@@ -92,6 +92,8 @@ double bearable(const std::string& output, const OutputFloors& floors, const std
   if (unit == "rad") natural = std::max(natural, 1.0);
   if (unit == "m") natural = std::max(natural, floors.length);
   if (unit == "m/s") natural = std::max(natural, floors.length * largest_in("rad/s"));
+  if (unit == "rad/s" && floors.inertia > 0)
+    natural = std::max(natural, std::sqrt(2 * largest_in("J") / floors.inertia));
   if (unit == "N m") natural = std::max(natural, floors.length * largest_in("N"));
   constexpr double round_off = 1e-14;
   double size = round_off * natural;

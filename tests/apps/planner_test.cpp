@@ -1,6 +1,7 @@
 // What a scene with modes = "auto" is simulated with.
 
 #include "apps/simulate/planner.hpp"
+#include "apps/model/static_shapes.hpp"
 #include "fem/base/check.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
@@ -95,6 +96,33 @@ TEST(Planner, ARunGoesOnToBetterModelsUntilTheBudgetIsMet) {
   EXPECT_TRUE(any_has(r.plan, "elements of a higher order"));
   EXPECT_GT(r.scene.bodies[1].geometry.order, 1);
   EXPECT_LT(r.budget.discretisation, 1e-2);
+}
+
+// The load of a joint converges as 1 / n with the modes of a free body. Its static shapes stand for the rest: in what
+// is planned, and in what shows the truncation of a body without them.
+TEST(Planner, BodiesUnderMeanAxesHaveStaticShapesOfTheirJoints) {
+  const auto swung = [](const std::string& modes, double tolerance) {
+    Scene scene = spun_about("z", tolerance, modes);
+    scene.bodies[1].basis.name = "mean-axis", scene.bodies[1].directions = "all";
+    scene.bodies[1].damping = {.name = "rayleigh", .beta = 1e-4};
+    scene.joints[1].kind = JointKind::hinge, scene.joints[1].mechanism.stiffness = 5;
+    return scene;
+  };
+  Scene full = swung("40", 1e-9);
+  full.error_budget = false;
+  full.bodies[1].basis.corrections = static_shapes_at("root");
+  const OutputTable reference = run_scene(full, {}).outputs;
+  const auto true_error = [&](const RunResult& r) {
+    return largest(compare_outputs(r.outputs, reference, r.scene.outputs));
+  };
+  const RunResult planned = run_scene(swung("\"auto\"", 1e-3), {});
+  EXPECT_TRUE(planned.budget.within(1e-3));
+  EXPECT_LE(true_error(planned), 1e-3);
+  EXPECT_LE(planned.bodies[1].body.n(), 24);
+  const RunResult without = run_scene(swung("18", 1e-4), {});
+  const double ratio = without.budget.total() / true_error(without);
+  EXPECT_GT(ratio, 0.5);
+  EXPECT_LT(ratio, 30);
 }
 
 TEST(Planner, AnOutputWithALooserAccuracyTakesFewerModes) {

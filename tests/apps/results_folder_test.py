@@ -153,7 +153,7 @@ class Failed(Case):
         result = flexboom("run", scene, "--formulation", "multipliers", "--tolerance", "0.1", "--duration", "0.2",
                           "--no-budget", "--report", "--out", out)
         self.assert_exit(NUMERICAL, result)
-        self.assertIn(f"the motion in {out} is wrong", result.stderr)
+        self.assertIn(f"the motion in {out}, or its energies, are wrong", result.stderr)
         summary, rows = self.summary(out), self.rows(out)
         self.assertEqual(summary["status"], "failed")
         self.assertIn(summary["error"], result.stderr)
