@@ -194,7 +194,9 @@ Finding truncation_of(std::optional<Beyond> beyond, const Run& run, const Scene&
                       const Repeats& repeats) {
   if (!beyond) return {};
   Scene& more = beyond->scene;
+  if (!beyond->has_few_digits) fly_ahead(with_a_digit_more(more), repeats.hooks, 0, bearable_steps(run));  // perhaps
   Finding r{repeats.change(run, more)};
+  give_up_ahead(repeats.hooks);
   const double noise = time_error > flown.step_tolerance() ? time_error / flown.step_tolerance() : 1;
   if (beyond->has_few_digits && largest(r.differences) <= 10 * noise * more.tolerance) {
     more.tolerance = flown.tolerance, more.integrator_tolerance = flown.integrator_tolerance;
