@@ -27,6 +27,7 @@ void FlightsAhead::begin(const Scene& scene, const RunHooks& hooks, int refine, 
     return;
   RunHooks quiet;
   quiet.interrupt = &stop_, quiet.bodies = hooks.bodies;
+  if (!alone_) alone_.emplace();
   begun_.push_back({std::move(made_of), std::async(std::launch::async, [scene, quiet, refine, max_steps] {
                       return run_once(scene, quiet, refine, max_steps);
                     })});
@@ -35,6 +36,7 @@ void FlightsAhead::begin(const Scene& scene, const RunHooks& hooks, int refine, 
 void FlightsAhead::give_up() {
   stop_ = true;
   begun_.clear();  // waits
+  alone_.reset();
   stop_ = false;
 }
 
@@ -50,6 +52,7 @@ std::optional<Run> FlightsAhead::take(const Scene& scene, const RunHooks& hooks,
     if (hooks.stopped()) stop_ = true;  // for good: all that is begun ends
   std::future<Run> run = std::move(flight->run);
   begun_.erase(flight);
+  if (begun_.empty()) alone_.reset();
   return run.get();
 }
 

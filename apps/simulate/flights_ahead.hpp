@@ -1,6 +1,7 @@
 #pragma once
 
 #include "apps/simulate/simulate.hpp"
+#include "fem/base/blas_threads.hpp"
 
 #include <atomic>
 #include <future>
@@ -39,6 +40,7 @@ class FlightsAhead {
   };
 
   std::atomic<bool> stop_ = false;
+  std::optional<OneBlasThread> alone_;  // as long as any is begun
   std::list<Flight> begun_;
   std::string kept_made_of_;
   std::optional<Run> kept_;
