@@ -251,8 +251,30 @@ class ExponentialStepper final : public Stepper {
     step_.linear->to_z(y.head(nx_), step_.Z.leftCols(1));
     step_.X.col(0) = y.head(nx_);
     motion_.start(step_.start, y);
+    if (layout_.loads_work) split_powers();
     evaluate(0);
     step_.linear->remainder(F_.leftCols(1), step_.Z.leftCols(1), step_.N.leftCols(1));
+  }
+
+  /// The power of a load vibrates with the point where it acts. By central differences about rest, which are exact:
+  /// powers are of second order in the rates at most.
+  void split_powers() {
+    const int energies = layout_.size - layout_.energies;
+    MatrixXd of_x = MatrixXd::Zero(energies, nx_);
+    VectorXd y = start_;
+    y.head(nx_) = step_.linear->base.head(nx_);
+    const auto add = [&](int i, double sign) {
+      y_ = y;
+      y_[i] += sign;
+      motion_.place(step_, 0, y_);
+      problem_->derivative(step_.start, y_.data(), contact_, y_dot_.data());
+      ++counts_.rhs_evaluations;
+      of_x.col(i) += 0.5 * sign * y_dot_.tail(energies);
+    };
+    for (const auto& [value, rate] : layout_.coordinates) add(rate, 1), add(rate, -1);
+    for (const SplitLayout::Turn& turn : layout_.turns)
+      for (int i = 0; i < 3; ++i) add(turn.omega + i, 1), add(turn.omega + i, -1);
+    motion_.split_powers(of_x, of_x * step_.linear->from_modes);
   }
 
   /// The end of the last step is the start of the next; N and the power there are those before momentum was kept, which

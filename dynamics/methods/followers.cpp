@@ -70,6 +70,7 @@ void Followers::go_on(const CollocatedStep& step, const VectorXd& y) {
 
 void Followers::take(int j, double t, const VectorXd& y, const VectorXd& y_dot) {
   power_.col(j) = y_dot.tail(energies_.size());
+  if (power_of_x_.size() > 0) power_.col(j).noalias() -= power_of_x_ * y.head(power_of_x_.cols());
   if (!layout_.outside_pushes) return;
   for (size_t i = 0; i < falls_.size(); ++i)
     falls_[i].acceleration.col(j) = problem_.outside_acceleration(i, t, y.data());
@@ -115,9 +116,10 @@ void Followers::turn(const CollocatedStep& step, const GridPoint& at, double c, 
   const auto I = collocation::integrals(c);
   y.tail(energies_.size()) = energies_;
   y.tail(energies_.size()).noalias() += step.length * (power_coefficients_.lazyProduct(I));
-  if (turns_.empty()) return;
+  if (turns_.empty() && power_of_z_.size() == 0) return;
   integral_.resize(step.linear->size());
   step.linear->combine(at, 1, step.Z.col(0), step.M, integral_);
+  if (power_of_z_.size() > 0) y.tail(energies_.size()).noalias() += step.length * (power_of_z_ * integral_);
   for (size_t i = 0; i < turns_.size(); ++i) {
     const auto omega = step.linear->omega_modes.middleRows<3>(3 * static_cast<Eigen::Index>(i));
     const Vector3d theta = step.length * (omega.lazyProduct(integral_) + turns_[i].coefficients * I);

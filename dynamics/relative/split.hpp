@@ -33,6 +33,7 @@ struct SplitLayout {
   std::vector<int> spins;         // of wheels
   std::vector<int> prescribed;    // entries of x that are given functions of time
   bool outside_pushes = false;    // does gravity or a load move a mass centre?
+  bool loads_work = false;        // does a load's power depend on x?
   bool attitudes_matter = false;  // does x' depend on an attitude, or on a place?
   bool momentum_is_kept = false;  // of all bodies, the first root among them
 };

@@ -49,6 +49,7 @@ SplitLayout layout_of(const Tree& tree) {
     r.gaps.push_back({gap, l.rate(gap)});
   }
   r.outside_pushes = model.poses || !tree.scene().gravity.isZero(0);
+  r.loads_work = !tree.scene().loads.empty();
   r.attitudes_matter = model.poses || spherical;
   r.momentum_is_kept = r.roots.size() == 1 && is_isolated(tree.scene());
   return r;
