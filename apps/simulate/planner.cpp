@@ -180,6 +180,7 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
     } catch (const NumericalError& e) {  // no more digits can be had: those that were reached count
       plan.push_back(fmt::format("time integration: no tighter than {:.0e}: {}", with_few.step_tolerance(), e.what()));
     }
+    if (with_few.integrator_tolerance != scene.integrator_tolerance) give_up_ahead(hooks);
     scene.integrator_tolerance = with_few.integrator_tolerance;
   }
   const auto run = [&](int candidates, long max_steps) {
