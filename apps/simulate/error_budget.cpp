@@ -297,7 +297,8 @@ OutputFloors floors_of(const Scene& scene, const std::vector<PreparedBody>& bodi
     floors.length = std::max(floors.length, std::sqrt(p.body.J0.trace() / p.body.m));
   for (const PreparedBody& p : bodies) {
     const double least = p.body.n() == 0 ? least_inertia(p.body) : 0;
-    if (least > 0 && !(floors.inertia > 0 && floors.inertia <= least)) floors.inertia = least;
+    const bool is_round_off = !(least > 1e-9 * p.body.J0.trace());
+    if (!is_round_off && !(floors.inertia > 0 && floors.inertia <= least)) floors.inertia = least;
   }
   for (const std::string& text : scene.absolute) floors.absolute.push_back(absolute_error(text));
   return floors;

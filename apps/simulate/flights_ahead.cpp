@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -27,10 +28,13 @@ void FlightsAhead::begin(const Scene& scene, const RunHooks& hooks, int refine, 
     return;
   RunHooks quiet;
   quiet.interrupt = &stop_, quiet.bodies = hooks.bodies;
+  const auto flight = [scene, quiet, refine, max_steps] { return run_once(scene, quiet, refine, max_steps); };
   if (!alone_) alone_.emplace();
-  begun_.push_back({std::move(made_of), std::async(std::launch::async, [scene, quiet, refine, max_steps] {
-                      return run_once(scene, quiet, refine, max_steps);
-                    })});
+  try {
+    begun_.push_back({std::move(made_of), std::async(std::launch::async, flight)});
+  } catch (const std::system_error&) {  // no thread to be had
+    if (begun_.empty()) alone_.reset();
+  }
 }
 
 void FlightsAhead::give_up() {

@@ -11,8 +11,8 @@
 
 namespace flexboom {
 
-/// Flights that are wanted soon, or perhaps, and that other cores fly meanwhile. What comes out is what run_once gives:
-/// a guess that was wrong costs time of those cores alone.
+/// Flights that are wanted soon, or perhaps, and that other cores fly meanwhile. What comes out is what run_once gives.
+/// A guess that was wrong costs time of those cores, and of this one where both make bodies ready.
 class FlightsAhead {
  public:
   FlightsAhead() = default;

@@ -88,12 +88,13 @@ double bearable(const std::string& output, const OutputFloors& floors, const std
     const auto found = all.find(of_unit);
     return found == all.end() ? 0.0 : found->second;
   };
+  constexpr double fastest = 100;  // [rad/s]: not all of the energy turns what is small
   double natural = largest_in(unit);
   if (unit == "rad") natural = std::max(natural, 1.0);
   if (unit == "m") natural = std::max(natural, floors.length);
   if (unit == "m/s") natural = std::max(natural, floors.length * largest_in("rad/s"));
   if (unit == "rad/s" && floors.inertia > 0)
-    natural = std::max(natural, std::sqrt(2 * largest_in("J") / floors.inertia));
+    natural = std::max(natural, std::min(fastest, std::sqrt(2 * largest_in("J") / floors.inertia)));
   if (unit == "N m") natural = std::max(natural, floors.length * largest_in("N"));
   constexpr double round_off = 1e-14;
   double size = round_off * natural;

@@ -31,7 +31,7 @@ bool is_pointing(const std::string& output);
 struct OutputFloors {
   double tolerance = 1;                   // what relative errors are held against
   double length = 0;                      // of the scene [m]
-  double inertia = 0;                     // the least of a rigid body that turns [kg m^2]; 0: there is none
+  double inertia = 0;                     // the least of a rigid body [kg m^2]; 0: there is none
   std::vector<AbsoluteError> absolute{};  // the user's
 };
 
@@ -46,9 +46,9 @@ struct OutputDifference {
 /// Over the outputs that both tables have and that are wanted (all but lvlh when `wanted` is empty): max over time of
 /// |a - b|, by the largest |b| over time. With floors that is no less than what tolerance makes of an absolute error
 /// and of round-off: 1e-14 of a radian, of the scene's length, of that times the largest rate or force, of the rate
-/// that all of the kinetic energy would give the least inertia, or of the largest output of the same unit. An output
-/// with an accuracy of its own (as wanted_output) is scaled so that its error is `tolerance` where it has that
-/// accuracy.
+/// that all of the kinetic energy would give the least inertia (100 rad/s at most), or of the largest output of the
+/// same unit. An output with an accuracy of its own (as wanted_output) is scaled so that its error is `tolerance` where
+/// it has that accuracy.
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted, const OutputFloors& = {});
 

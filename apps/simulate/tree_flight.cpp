@@ -258,12 +258,14 @@ int samples_of(const Scene& scene, const std::vector<const CourseScene*>& course
 
 void set_corners(const Scene& scene, IntegratorOptions& o) {
   const auto add_corners = [&](const std::vector<double>& corners) {
+    const double round_off = 2e-14 * scene.duration;
     for (const double t : corners)
-      if (t > 0 && t < scene.duration) o.corners.push_back(t);
+      if (t > round_off && t < scene.duration - round_off) o.corners.push_back(t);
   };
   std::vector<const CourseScene*> courses, motions;
   const auto add = [](const CourseScene& c, std::vector<const CourseScene*>& list) {
-    if (c.given()) list.push_back(&c);
+    const bool is_number = !c.expression.empty() && c.expression.find('t') == std::string::npos;
+    if (c.given() && !is_number) list.push_back(&c);
   };
   for (const JointScene& j : scene.joints) {
     add(j.drive, courses);

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <span>
 #include <utility>
@@ -138,12 +139,12 @@ class Flight : protected StopMotion, protected LawMotion {
     return end;
   }
 
-  /// The corner that t_ has come to, or nothing. A step ends before it, the next one begins on it: what jumps there has
-  /// one value within a step.
+  /// The corner that t_ has come to, the last of those that are one but for round-off, or nothing. A step ends before
+  /// it, the next one begins on it: what jumps there has one value within a step.
   std::optional<double> corner_reached() const {
-    const auto corner = std::ranges::upper_bound(options_.corners, t_);
-    if (corner == options_.corners.end() || *corner > t_ + round_off()) return {};
-    return *corner;
+    const auto beyond = std::ranges::upper_bound(options_.corners, t_ + round_off());
+    if (beyond == options_.corners.begin() || !(*std::prev(beyond) > t_)) return {};
+    return *std::prev(beyond);
   }
 
   double round_off() const { return 1e-14 * options_.duration; }

@@ -24,6 +24,12 @@ Vector3d turning(const Vector3d& theta, const Vector3d& omega) {
   return 0.5 * theta.cross(omega) + c * theta.cross(theta.cross(omega));
 }
 
+/// What the middle point adds to the polynomial of the others.
+template <class Row>
+double roughness(const Row& row) {
+  return std::abs(row.dot(collocation::middle_difference()));
+}
+
 }  // namespace
 
 Followers::Followers(SplitProblem& problem, const ErrorScale& scale)
@@ -34,7 +40,9 @@ Followers::Followers(SplitProblem& problem, const ErrorScale& scale)
       falls_(layout_.roots.size()),
       energies_(layout_.size - layout_.energies),
       power_(Rows::Zero(energies_.size(), points)),
+      remainder_(power_),
       power_coefficients_(power_),
+      is_split_(static_cast<size_t>(energies_.size()), 0),
       linear_(Rows::Zero(3 * std::ssize(turns_), points)) {}
 
 void Followers::set_start(const VectorXd& y) {
@@ -44,6 +52,7 @@ void Followers::set_start(const VectorXd& y) {
 
 void Followers::start(double t, const VectorXd& y) {
   power_coefficients_.setZero();
+  std::ranges::fill(is_split_, 0);
   set_start(y);
   t_ = t;
   for (Turning& turn : turns_) turn.coefficients.setZero();
@@ -60,6 +69,7 @@ void Followers::start(double t, const VectorXd& y) {
 
 void Followers::go_on(const CollocatedStep& step, const VectorXd& y) {
   power_.col(0) = power_.col(degree).eval();
+  remainder_.col(0) = remainder_.col(degree).eval();
   set_start(y);
   for (Falling& fall : falls_) {
     fall.com += step.length * fall.velocity + fall.way(step.length, 1);
@@ -70,7 +80,8 @@ void Followers::go_on(const CollocatedStep& step, const VectorXd& y) {
 
 void Followers::take(int j, double t, const VectorXd& y, const VectorXd& y_dot) {
   power_.col(j) = y_dot.tail(energies_.size());
-  if (power_of_x_.size() > 0) power_.col(j).noalias() -= power_of_x_ * y.head(power_of_x_.cols());
+  remainder_.col(j) = power_.col(j);
+  if (power_of_x_.size() > 0) remainder_.col(j).noalias() -= power_of_x_ * y.head(power_of_x_.cols());
   if (!layout_.outside_pushes) return;
   for (size_t i = 0; i < falls_.size(); ++i)
     falls_[i].acceleration.col(j) = problem_.outside_acceleration(i, t, y.data());
@@ -101,7 +112,11 @@ void Followers::take_turn(const CollocatedStep& step, size_t turn, const Rows& a
 
 void Followers::follow(const CollocatedStep& step) {
   const auto& to_coefficients = collocation::coefficients();
-  power_coefficients_.noalias() = power_ * to_coefficients;
+  for (Eigen::Index i = 0; i < power_.rows(); ++i) {
+    const bool is_split = power_of_x_.size() > 0 && roughness(remainder_.row(i)) < roughness(power_.row(i));
+    is_split_[static_cast<size_t>(i)] = is_split;
+    power_coefficients_.row(i).noalias() = (is_split ? remainder_ : power_).row(i) * to_coefficients;
+  }
   if (turns_.empty()) return;
   integral_.resize(step.linear->size());
   for (int j = 1; j < points; ++j) {
@@ -116,10 +131,13 @@ void Followers::turn(const CollocatedStep& step, const GridPoint& at, double c, 
   const auto I = collocation::integrals(c);
   y.tail(energies_.size()) = energies_;
   y.tail(energies_.size()).noalias() += step.length * (power_coefficients_.lazyProduct(I));
-  if (turns_.empty() && power_of_z_.size() == 0) return;
+  const bool any_split = std::ranges::find(is_split_, 1) != is_split_.end();
+  if (turns_.empty() && !any_split) return;
   integral_.resize(step.linear->size());
   step.linear->combine(at, 1, step.Z.col(0), step.M, integral_);
-  if (power_of_z_.size() > 0) y.tail(energies_.size()).noalias() += step.length * (power_of_z_ * integral_);
+  for (Eigen::Index i = 0; i < energies_.size() && any_split; ++i)
+    if (is_split_[static_cast<size_t>(i)] != 0)
+      y[y.size() - energies_.size() + i] += step.length * power_of_z_.row(i).dot(integral_);
   for (size_t i = 0; i < turns_.size(); ++i) {
     const auto omega = step.linear->omega_modes.middleRows<3>(3 * static_cast<Eigen::Index>(i));
     const Vector3d theta = step.length * (omega.lazyProduct(integral_) + turns_[i].coefficients * I);
@@ -142,8 +160,10 @@ double Followers::error(const CollocatedStep& step, const Ref<const VectorXd>& z
   const double weight = step.length * collocation::middle_polynomial().dot(collocation::integrals(1));
   const auto in_units = [this](double error, int entry) { return error / (scale_.tolerance * scale_.scale[entry]); };
   double error = 0;
-  for (Eigen::Index i = 0; i < energies_.size(); ++i)
-    error = std::max(error, in_units(std::abs(power_.row(i).dot(d)) * weight, layout_.energies + static_cast<int>(i)));
+  for (Eigen::Index i = 0; i < energies_.size(); ++i) {
+    const double rough = roughness((is_split_[static_cast<size_t>(i)] != 0 ? remainder_ : power_).row(i));
+    error = std::max(error, in_units(rough * weight, layout_.energies + static_cast<int>(i)));
+  }
   for (size_t i = 0; i < turns_.size(); ++i) {
     // What a rate keeps of the error turns it: until the end, or until momentum takes it back.
     const double kept =

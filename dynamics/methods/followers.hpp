@@ -17,7 +17,8 @@ class Followers {
   Followers(SplitProblem&, const ErrorScale&);
 
   /// From the next start on, powers are `of_x` x and a remainder (a row per energy), `of_z` z the same of the modes:
-  /// what of them vibrates with x is integrated as x is, the remainder by its polynomial. Empty: all is remainder.
+  /// what of them vibrates with x is integrated as x is, the remainder by its polynomial. In steps where the remainder
+  /// is rougher than the whole, the polynomial is that of the whole. Empty: all is remainder.
   void split_powers(const Eigen::MatrixXd& of_x, const Eigen::MatrixXd& of_z) {
     power_of_x_ = of_x, power_of_z_ = of_z;
   }
@@ -80,9 +81,10 @@ class Followers {
   double t_ = 0;  // of the start
   std::vector<Turning> turns_;
   std::vector<Falling> falls_;
-  Eigen::VectorXd energies_;         // at the start
-  Rows power_, power_coefficients_;  // remainders, a row per energy
+  Eigen::VectorXd energies_;                     // at the start
+  Rows power_, remainder_, power_coefficients_;  // a row per energy
   Eigen::MatrixXd power_of_x_, power_of_z_;
+  std::vector<char> is_split_;        // in this step, per energy
   Rows linear_;                       // integrals of omega at the points, three rows per turn
   Eigen::Vector3d angular_momentum_;  // at the very first start
   bool started_ = false;

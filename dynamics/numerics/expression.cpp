@@ -329,12 +329,14 @@ std::vector<double> Expression::corners(double begin, double end, int samples) c
       curved.push_back(i);
       continue;
     }
-    const double zero = (other.value - x[0].value) / (x[0].slope - other.slope), near = 1e-12 * std::abs(zero) + 1e-300;
+    const double zero = (other.value - x[0].value) / (x[0].slope - other.slope);
     if (!(begin < zero && zero < end)) continue;
     const auto side_at = [&](double t) {
       evaluate(nodes_, t, value);
       return side_of(i, value);
     };
+    double near = 1e-12 * std::abs(zero) + 1e-300;
+    while (side_at(zero - near) == side_at(zero + near) && near < end - begin) near *= 10;  // large terms cancel
     add_changes(side_at, zero - near, zero + near, 1, times);
   }
   const auto sides_at = [&](double t) {
