@@ -31,8 +31,7 @@ std::vector<std::string> static_shapes_of_loads(const Scene& scene, const BodySc
     if (std::ranges::find(sets, place.marker) == sets.end()) sets.push_back(place.marker);
   };
   for (const JointScene& joint : scene.joints) note(joint.a), note(joint.b);
-  for (const HingeScene& hinge : scene.hinges)
-    if (hinge.body == body.name && body.basis.name == "mean-axis") sets.emplace_back("root");
+  for (const HingeScene& hinge : scene.hinges) note({.body = hinge.body, .marker = "root"});
   for (const SpringScene& spring : scene.springs) note(spring.a), note(spring.b);
   for (const LoadScene& load : scene.loads) note(load.at);
   for (const std::string& set : sets)

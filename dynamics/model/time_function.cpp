@@ -141,10 +141,6 @@ TimeCourse smooth(const Manoeuvre& m) {
   return c;
 }
 
-}  // namespace
-
-namespace {
-
 /// Samples of a function at equal distances.
 struct Sampled {
   std::vector<double> value;
