@@ -88,6 +88,7 @@ class Flight : protected StopMotion, protected LawMotion {
 
  private:
   void advance() {
+    const double from = t_;
     double t = t_;
     next_y_ = y_;
     step(limit(), t, next_y_);
@@ -98,7 +99,7 @@ class Flight : protected StopMotion, protected LawMotion {
     t_ = t, y_.swap(next_y_);
     const std::optional<double> corner = corner_reached();
     if (corner) t_ = *corner;
-    write_outputs();
+    if (!write_outputs(from)) return;
     observe(y_);
     const bool met = contacts_.update(*this, t_, result_.events), changed = laws_.update(*this, t_, result_.events);
     if (changed) observe(y_);  // sudden losses are large at once
@@ -109,23 +110,30 @@ class Flight : protected StopMotion, protected LawMotion {
     if (options_.progress && steps_ % 256 == 0) options_.progress(t_, options_.duration);
   }
 
-  /// Outputs up to t_: those within the step as many at a time as go at once.
-  void write_outputs() {
+  /// Outputs up to t_: those within the step as many at a time as go at once. False where the flight is stopped before
+  /// the last of them: it is then where the last row is, or where the step came `from`, and next_y_ was its state.
+  bool write_outputs(double from) {
     constexpr std::size_t at_once = 16;
     samples_.resize(y_.size(), at_once);
-    for (;;) {
+    for (double written = from;;) {
       times_.clear();
       double next = output_time();
       for (; times_.size() < at_once && next < t_; next = outputs_.after(result_.time.size() + times_.size()))
         times_.push_back(next);
-      if (times_.empty() || stopped()) break;
+      if (times_.empty()) break;
+      if (stopped()) {
+        t_ = written, y_ = next_y_;
+        return false;
+      }
       interpolate(times_, samples_);
       for (std::size_t i = 0; i < times_.size(); ++i) {
         if (options_.progress && result_.time.size() % 1024 == 0) options_.progress(times_[i], options_.duration);
         record(times_[i], samples_.col(static_cast<Eigen::Index>(i)));
       }
+      written = times_.back(), next_y_ = samples_.col(static_cast<Eigen::Index>(times_.size()) - 1);
     }
-    if (output_time() == t_ && !stopped()) record(t_, y_);
+    if (output_time() == t_) record(t_, y_);
+    return true;
   }
 
   /// Where the next step must end at the latest. What is nearer than round-off is reached.

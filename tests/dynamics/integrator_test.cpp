@@ -282,6 +282,30 @@ TEST(Integrator, StopsWhenAsked) {
   EXPECT_EQ(r.time, (std::vector<double>{0.0}));
 }
 
+// A step may hold thousands of outputs. Where it is interrupted among them, the flight is where the last of them is:
+// what goes on from there misses none, and moves as if nothing had happened.
+TEST(Integrator, AnInterruptionWithinAStepLosesNoOutput) {
+  const Hub system = boom_2(0);
+  for (const char* method : {"exponential", "adams", "dirk"}) {
+    SCOPED_TRACE(method);
+    std::atomic<bool> stop{false};
+    IntegratorOptions o;
+    o.method = method;
+    o.duration = 0.5;
+    o.output_step = 2e-6;
+    o.tolerance = 1e-8;
+    const TreeTrajectory whole = integrate(system, system.pack(system.at_rest({1.5})), o);
+    o.interrupt = &stop;
+    o.progress = [&](double t, double) { stop = stop || t > 0.2; };
+    const TreeTrajectory cut = integrate(system, system.pack(system.at_rest({1.5})), o);
+    ASSERT_TRUE(cut.summary.interrupted);
+    ASSERT_GT(cut.time.size(), 100000u);
+    ASSERT_LT(cut.time.size(), whole.time.size());
+    for (size_t i = 0; i < cut.time.size(); ++i) ASSERT_EQ(cut.time[i], whole.time[i]) << i;
+    EXPECT_LT((cut.y.back() - whole.y[cut.y.size() - 1]).cwiseAbs().maxCoeff(), 1e-12);
+  }
+}
+
 TEST(Integrator, StartsBeyondTheStopAndExactlyOnIt) {
   const Hub system = boom_2(0);
   IntegratorOptions o;
