@@ -102,7 +102,8 @@ BasisOptions basis_options(const ReduceArguments& a, const Model& model) {
   if (!a.hinge_stiffness.empty()) o.hinge_stiffness = a.hinge_stiffness;
   if (!a.hinge_axis.empty()) o.hinge_axis = vector_of(a.hinge_axis);
   if (!a.spin.empty() || !a.acceleration.empty() || !a.turns.empty()) o.motion = steady_motion(a, o.motion);
-  o.in_plane = o.name == "hinge";
+  const bool all = model.body && model.body->directions == "all";
+  o.in_plane = o.name == "hinge" && !all;
   o.modes = a.count.value_or(o.name == "hinge" ? 1 : model.modes.value_or(10));
   o.backend = a.backend.value_or(model.backend.value_or("auto"));
   return o;

@@ -22,23 +22,30 @@ ReducedBody for_comparison(Model model, const ReductionOptions& o, int threads) 
   return body;
 }
 
-/// With as many more modes as the elements have, eight at most.
+/// With as many more modes as the elements have, eight at most; with those of all directions beside a plane's, where
+/// the hinge lets them be told apart.
 std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions o, const ReducedBody& kept,
                                            int threads) {
   o.select.reset();
   const int given = o.basis.modes;
   if (o.basis.name == "clamped" && !o.basis.in_plane && model.body && !model.clamped.empty())
     add_static_shapes(o.basis.corrections, static_shapes_at(model.clamped == "tip" ? "root" : "tip"));
-  for (int more = 8; more >= 0; more -= 2) {
-    o.basis.modes = given + (o.basis.in_plane ? more / 2 : more);
-    try {
-      ReducedBody body = for_comparison(model, o, threads);
-      if (body.n() > kept.n()) return body;
-      return {};
-    } catch (const InputError&) {  // it has not so many
+  const auto richer = [&](bool in_plane) -> std::optional<ReducedBody> {
+    o.basis.in_plane = in_plane;
+    for (int more = 8; more >= 0; more -= 2) {
+      o.basis.modes = given + (in_plane || o.basis.name == "hinge" ? more / 2 : more);
+      try {
+        ReducedBody body = for_comparison(model, o, threads);
+        if (body.n() > kept.n()) return body;
+        return {};
+      } catch (const InputError&) {  // it has not so many
+      }
     }
-  }
-  return {};
+    return {};
+  };
+  const bool in_plane = o.basis.in_plane;
+  if (std::optional<ReducedBody> all = richer(false)) return all;
+  return in_plane ? richer(true) : std::nullopt;
 }
 
 }  // namespace

@@ -1246,12 +1246,18 @@ class Reduce(Case):
         self.assertLess(error(exact), 1e-8)
 
     def test_hinge_basis(self):
-        document = self.reduce("--basis", "hinge", "--hinge-stiffness", "0.22,30")[1]
-        self.assertEqual(len(document["coordinates"]), 2)
+        """Shapes that turn the root for each stiffness, and beside them what the body's directions ask for."""
+        plane = self.folder / "plane.toml"
+        plane.write_text(BOOM4.read_text().replace('directions = "all"', 'directions = "hinge-plane"', 1))
         for count in (1, 2, 3):
-            document = self.reduce("--basis", "hinge", "--hinge-stiffness", "0.22,30", "--count", count)[1]
-            self.assertEqual(self.failed(document), [], count)
-            self.assertEqual(len(document["coordinates"]), 2 * count)
+            hinge = ("-o", self.folder / "body.h5", "--json", "--basis", "hinge", "--hinge-stiffness", "0.22,30", "--count", count)
+            for model, beside in ((plane, 0), (BOOM4, count)):
+                result = flexboom("reduce", model, *hinge)
+                self.assert_exit(OK, result)
+                document = json.loads(result.stdout)
+                self.assertEqual(self.failed(document), [], count)
+                kinds = [c["kind"] for c in document["coordinates"]]
+                self.assertEqual((kinds.count("bending_y"), len(kinds)), (2 * count, 2 * count + beside), kinds)
 
     def test_names_of_node_sets_compare_without_case(self):
         """Decks write them in capitals."""
