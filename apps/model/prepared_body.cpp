@@ -57,7 +57,7 @@ PreparedBody prepare_reduced(const BodyScene& b, int refine) {
   const bool finer = refine > 0 && b.richer && b.richer->finer_elements;
   PreparedBody p = prepared(finer ? *b.richer->finer_elements : *b.reduced);
   p.body.name = b.name;
-  if (b.damping.name != "none") apply_damping(p.body, b.damping);  // else the file's
+  if (b.other_damping) apply_damping(p.body, *b.other_damping);
   if (p.body.display.points.cols() == 0) p.body.display = box_of(p.body);
   return p;
 }
@@ -166,7 +166,7 @@ Mesh mesh_of(const BodyScene& b, int refine) {
 }
 
 bool is_bearable(const Mesh& mesh) {
-  constexpr Eigen::Index most_unknowns = 120'000;  // of a solid: three per node
+  constexpr Eigen::Index most_unknowns = 140'000;  // of a solid: three per node
   return mesh.nodes.size() <= most_unknowns;
 }
 

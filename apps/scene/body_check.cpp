@@ -286,7 +286,7 @@ void check_body(const BodyScene& body, const std::string& path, Faults& faults) 
     faults.add(join(path, "file"),
                "has coordinates that hold the motion of the whole body, which its joint has, too; reduce it with "
                "--reference");
-  check_damping(faults, join(path, "damping"), body.damping);
+  check_damping(faults, join(path, "damping"), body.other_damping.value_or(body.damping));
   if (body.reduced || !body.reduced_file.empty()) return;
   check_basis(faults, path, body);
   check_clamp(faults, path, body);

@@ -277,7 +277,7 @@ void reduced_keys(Archive& a, BodyScene& b) {
   a.key({"file", "", "`.h5` file of `flexboom reduce`", required}, file);
   if (b.stiffening.empty()) b.stiffening = "auto";
   a.choice({"stiffening", "", "geometric stiffness"}, stiffenings, b.stiffening);
-  a.table({"damping", "", "of the elastic coordinates", false, "the file's"}, b.damping, damping_keys, "Damping");
+  a.table({"damping", "", "of the elastic coordinates", false, "the file's"}, b.other_damping, damping_keys, "Damping");
 }
 
 }  // namespace

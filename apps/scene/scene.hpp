@@ -54,6 +54,7 @@ struct BodyScene {
   std::optional<RigidScene> rigid;             // instead of a geometry; structure is "rigid"
   std::shared_ptr<const ReducedBody> reduced;  // instead of a geometry; structure is that of the file
   std::filesystem::path reduced_file;          // where `reduced` is from, absolute
+  std::optional<DampingRule> other_damping;    // instead of that of the file
   std::shared_ptr<const RicherBodies> richer;  // what the file has for error estimates; may be null
   /// Modes of all directions count, unless the file says which.
   void open_directions() {

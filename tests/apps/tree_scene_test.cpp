@@ -1,5 +1,6 @@
 // Scenes with joints: what is read, written back and refused.
 
+#include "apps/results/results.hpp"
 #include "apps/scene/scene.hpp"
 #include "apps/simulate/simulate.hpp"
 #include "tests/apps/run_testing.hpp"
@@ -10,6 +11,8 @@
 #include "reduction/body_file/body_file.hpp"
 
 #include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -150,6 +153,29 @@ TEST(TreeScene, HingesCarryBodiesReducedBefore) {
     EXPECT_NE(fault.find("boom.h5"), std::string::npos) << fault;
     EXPECT_EQ(fault.find("the line has"), std::string::npos) << fault;
   }
+  std::filesystem::remove_all(folder);
+}
+
+// "none" beside a file is not the damping of the file.
+TEST(TreeScene, DampingBesideAReducedBodyReplacesThatOfItsFile) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("damped." + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  Scene plain = parse_scene(swing_on_hinge, "scene.toml");
+  plain.bodies[0].damping = {.name = "modal", .value = 0.05};
+  write_body_file(folder / "boom.h5", prepare_body(plain.bodies[0]).body);
+  const auto lost = [&](const std::string& damping) {
+    const std::string text = from_file(swing_on_hinge);
+    const size_t end = text.find("[hub]");
+    Scene scene = parse_scene(text.substr(0, end) + damping + text.substr(end), "scene.toml", folder);
+    scene = parse_scene(to_toml(scene), "again.toml", folder);
+    scene.error_budget = false;
+    return summary_json(run_scene(scene, {}), 0)["energy"]["lost"]["structure"].get<double>();
+  };
+  const double of_file = lost(""), of_more = lost("damping = { rule = \"modal\", value = 0.1 }\n");
+  EXPECT_GT(of_file, 0);
+  EXPECT_GT(of_more, 1.2 * of_file);
+  EXPECT_EQ(lost("damping = { rule = \"none\" }\n"), 0);
   std::filesystem::remove_all(folder);
 }
 
