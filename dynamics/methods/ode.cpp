@@ -39,8 +39,9 @@ class OdeOfTree final : public Ode {
     LawPoint p{tree_.gap(y, joint), tree_.gap_rate(y, joint)};
     if (Laws::needs_acceleration(s) || Laws::needs_hold(s)) p.hold = hold_load(t, y, joint);
     if (Laws::needs_acceleration(s)) p.acceleration = tree_.gap_rate(y_dot_.data(), joint);
-    if (Laws::needs_hold(s)) {  // along the motion; the slope only guides the search
-      constexpr double h = 1e-6;
+    if (Laws::needs_hold(s)) {  // along the motion, not beyond its end; the slope only guides the search
+      constexpr double moment = 1e-6;
+      const double h = t > moment ? -moment : moment;
       const Eigen::VectorXd step = h * y_dot_;
       x_ = Eigen::Map<const Eigen::VectorXd>(y, size()) + step;
       const double after = hold_load(t + h, x_.data(), joint);

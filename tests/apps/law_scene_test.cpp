@@ -171,6 +171,20 @@ TEST(LawScene, SummaryTellsWhereTheEnergyWent) {
   EXPECT_GT(energy["lost"]["friction"].get<double>(), 1e-3);
 }
 
+// What holds a joint that sticks is sought along the motion: not beyond the end, where an orbit with J2 is not known.
+TEST(LawScene, StictionAtTheEndOfAnOrbitWithJ2) {
+  for (const char* integrator : {"adams", "bdf", "dirk", "erk"}) {
+    Scene scene =
+        parse_scene(scene_text("friction = { coulomb = 100 }", "[orbit]\naltitude = 400e3\nJ2 = true\n"), "law.toml");
+    scene.duration = 0.5;
+    scene.integrator = integrator;
+    const RunResult r = run_scene(scene, {});
+    EXPECT_EQ(r.trajectory.time.back(), 0.5) << integrator;
+    const VectorXd angle = column(r, "hinge.angle");
+    EXPECT_LT((angle.array() - angle[0]).abs().maxCoeff(), 1e-9) << integrator;
+  }
+}
+
 TEST(LawScene, HingesOfAHubHaveThemToo) {
   const auto with = [](const std::string& law) {
     std::string text = builtin_scene("sport");
