@@ -1,6 +1,7 @@
 // Bounds of discretisation errors: the mesh of a model beside finer ones of the same boom.
 
 #include "apps/model/bounded_modes.hpp"
+#include "apps/model/mesh_tuning.hpp"
 
 #include "dynamics/events/flight.hpp"
 #include "fem/base/check.hpp"
@@ -23,6 +24,7 @@ constexpr double unresolved = 0.1;                       // change of a frequenc
 constexpr double round_off = 1e-12;                      // of a frequency by any mesh
 constexpr int most_steps = 3;                            // to finer meshes
 constexpr double usual_fall = 0.5, singular_fall = 0.7;  // of errors, to the next mesh
+constexpr const char* from_coarser = "from the mesh one step coarser";
 
 bool is_solid(const Model& model) { return model.body && model.body->structure == "solid"; }
 
@@ -32,7 +34,7 @@ bool follows_accuracy(const BodyScene& body) {
   const SolidGrading& g = s.grading;
   return body.structure == "solid" && s.element == "hex" && s.order == 0 && g.sectors == 0 && g.rings == 0 &&
          g.long_elements == 0 && g.end_layers < 0 && g.first_layer == 0 && g.growth == 0 && g.corner_levels < 0 &&
-         g.factor == 0;
+         g.factor == 0 && g.edge_levels < 0;
 }
 
 /// Of errors of one section's meshes; `own`: of the program's choice. Re-entrant edges along the boom are singular, and
@@ -92,12 +94,47 @@ FrequencyBounds bounds_of(const ModalBasis& m, const ModalBasis& other, double s
   return r;
 }
 
+/// How far frequencies are from those of the next mesh; where there is none, from those of the mesh one step coarser.
+/// Steps count from `start`, which has `steps` less than `m`. Returns the modes of the next mesh.
+std::optional<BoundedModes> bound(BoundedModes& m, const Model& start, int steps, double fall,
+                                  const EigenOptions& options, int threads) {
+  std::optional<BoundedModes> next = finer(start, steps + 1, options, threads);
+  if (next) {
+    m.bounds = bounds_of(m.basis, next->basis, 1 - fall);
+    return next;
+  }
+  if (const std::optional<BoundedModes> coarser = finer(start, steps - 1, options, threads)) {
+    m.bounds = bounds_of(m.basis, coarser->basis, (1 - fall) / fall);
+    m.bounds.how = from_coarser;
+    m.bound_seconds += seconds_of(*coarser);
+  }
+  return {};
+}
+
+/// Goes on to finer meshes until the accuracy is met, `most` steps at most.
+BoundedModes climb(BoundedModes here, int most, double fall, const EigenOptions& options, int threads) {
+  const Model start = here.model;
+  for (int steps = 0;; ++steps) {
+    std::optional<BoundedModes> next = bound(here, start, steps, fall, options, threads);
+    if (!next) return here;
+    if (here.met() == true || steps == most) {
+      here.bound_seconds += seconds_of(*next);
+      return here;
+    }
+    next->bounds = bounds_of(next->basis, here.basis, (1 - fall) / fall);
+    next->bounds.how = from_coarser;
+    next->bound_seconds = here.bound_seconds + seconds_of(here);
+    here = *std::move(next);
+    if (here.met() == true) return here;
+  }
+}
+
 }  // namespace
 
 double slowest_fall(const BodyScene& body) {
   if (body.structure != "solid") return usual_fall;
-  if (body.solid.slit > 0) return singular_fall;
   const bool own = follows_accuracy(body);
+  if (body.solid.slit > 0) return singular_fall;
   double slowest = 0;
   for (const BeamSegment& s : body.geometry.segments)
     slowest = std::max({slowest, slowest_fall(s.start, own), slowest_fall(s.end, own)});
@@ -120,28 +157,24 @@ std::optional<bool> BoundedModes::met() const {
 
 BoundedModes bounded_modes(Model model, const EigenOptions& options, int threads) {
   const bool refine = model.body && follows_accuracy(*model.body);
-  BoundedModes here = modes_of(std::move(model), options, threads);
-  here.bounds.relative = VectorXd::Constant(here.basis.omega.size(), unknown);
-  here.bounds.how = "a mesh file has no finer mesh to be compared with";
-  if (!here.model.body) return here;
-  here.bounds.how = "there is no finer mesh that is small enough to be compared with";
-  const Model start = here.model;
-  const double fall = slowest_fall(*start.body);
-  for (int i = 1; i <= 1 + most_steps; ++i) {
-    std::optional<BoundedModes> next = finer(start, i, options, threads);
-    if (!next) return here;
-    here.bounds = bounds_of(here.basis, next->basis, 1 - fall);
-    if (!refine || here.met() == true) {
-      here.bound_seconds += seconds_of(*next);
-      return here;
-    }
-    next->bounds = bounds_of(next->basis, here.basis, (1 - fall) / fall);
-    next->bounds.how = "from the mesh one step coarser";
-    next->bound_seconds = here.bound_seconds + seconds_of(here);
-    here = std::move(*next);
-    if (here.met() == true) return here;
-  }
-  return here;
+  BoundedModes first = modes_of(std::move(model), options, threads);
+  first.bounds.relative = VectorXd::Constant(first.basis.omega.size(), unknown);
+  first.bounds.how = "a mesh file has no finer mesh to be compared with";
+  if (!first.model.body) return first;
+  first.bounds.how = "there is no other mesh that is small enough to be compared with";
+  const double fall = slowest_fall(*first.model.body);
+  if (!refine) return climb(std::move(first), 0, fall, options, threads);
+  Model start = first.model;
+  BoundedModes here = climb(std::move(first), 1, fall, options, threads);
+  if (here.met() == true) return here;
+  Stopwatch clock;
+  Model better = tuned(std::move(start), here.basis.rigid_freedoms, *here.accuracy, options, threads);
+  const double tuning = clock.seconds();
+  BoundedModes again = climb(modes_of(std::move(better), options, threads), most_steps, fall, options, threads);
+  const auto worst = [](const BoundedModes& m) { return m.bounds.worst(m.basis.rigid_freedoms); };
+  if (again.met() != true && !(worst(again) < worst(here))) std::swap(here, again);
+  again.bound_seconds += tuning + here.bound_seconds + seconds_of(here);
+  return again;
 }
 
 }  // namespace flexboom

@@ -46,8 +46,8 @@ double slowest_fall(const BodyScene&);
 /// is never less than a fiftieth of the largest. Where the change is a tenth of the frequency or more, the coarser mesh
 /// resolves neither this mode nor those above it, whose order may change.
 ///
-/// A solid boom of which no more than the accuracy is given (SolidOptions) goes on to finer meshes until it is met,
-/// three steps at most, and none of more than 120 000 unknowns.
+/// A solid boom of which no more than the accuracy is given (SolidOptions) goes on to finer meshes until it is met: one
+/// step, then one of its own (`tuned`) and three steps from there at most, none of more than 140 000 unknowns.
 /// @throws InputError, NumericalError as clamped_modes.
 BoundedModes bounded_modes(Model, const EigenOptions&, int threads);
 

@@ -43,7 +43,7 @@ struct Model {
 /// @throws InputError where it is no boom, or has no mesh that is so coarse.
 Model refined(const Model&, int steps);
 
-/// As refined. Empty where the mesh has more than 120 000 unknowns: about a minute, and four gigabytes.
+/// As refined. Empty where the mesh has more than 140 000 unknowns: about a minute, and four gigabytes.
 std::optional<Model> refined_if_bearable(const Model&, int steps);
 
 /// @throws InputError naming the file and the place in it, a set that it lacks, or an option that does not apply to it.

@@ -30,7 +30,7 @@ struct PreparedBody {
 /// refines singular rims. @throws InputError where there is no mesh that is so coarse.
 Mesh mesh_of(const BodyScene&, int refine = 0);
 
-/// Has a mesh 120 000 unknowns at most? More take minutes, and more than four gigabytes.
+/// Has a mesh 140 000 unknowns at most? More take minutes, and more than four gigabytes.
 bool is_bearable(const Mesh&);
 
 /// Geometry -> mesh -> K, M -> basis -> reduced body, or the closed form, or the body that the scene gives.

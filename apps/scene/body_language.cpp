@@ -164,6 +164,10 @@ void grading_keys(Archive& a, SolidGrading& g) {
   a.key({"corner_levels", "", "refinements toward the singular rims of clamps and steps", false, "chosen"},
         g.corner_levels);
   a.key({"factor", "", "ratio of one refinement to the next", false, "chosen"}, g.factor);
+  a.key({"edge_levels", "",
+         "cuts toward edges along the boom: inner ones of rectangular tubes, those of slits and long sides", false,
+         "chosen"},
+        g.edge_levels);
 }
 
 void solid_keys(Archive& a, SolidOptions& o) {

@@ -202,6 +202,52 @@ bool is_rectangle(const SectionShape& shape) {
   return std::holds_alternative<Rectangle>(shape) || std::holds_alternative<RectangularTube>(shape);
 }
 
+// ---- cuts of sides and rings
+
+// Of a side, in lengths of the side, to which an edge at its end disturbs the stresses: the thickness. 0: none does.
+double edge_zone(const BeamGeometry& boom, const SolidOptions& options, size_t side) {
+  constexpr double largest = 0.25;
+  const SectionShape& shape = boom.segments.front().start;
+  const auto of_rectangle = [&](double height, double width) { return side % 2 == 0 ? width : height; };
+  if (const auto* box = std::get_if<RectangularTube>(&shape)) {
+    const double hollow = of_rectangle(box->height, box->width) - 2 * box->thickness;
+    return std::min(largest, box->thickness / hollow);
+  }
+  if (const auto* r = std::get_if<Rectangle>(&shape)) {
+    const double zone = std::min(r->height, r->width) / of_rectangle(r->height, r->width);
+    return zone <= largest ? zone : 0;
+  }
+  const auto* tube = std::get_if<Tube>(&shape);
+  if (tube == nullptr || options.slit == 0) return 0;
+  const double midline = std::numbers::pi * (tube->diameter - tube->thickness) - options.slit;
+  return std::min(largest, tube->thickness / (midline / 4));
+}
+
+constexpr double edge_factor = 0.15;  // of a cut toward an edge to the next
+
+// Cuts of [0, 1]: `count` even ones, and in the zone at an end `levels` that shrink toward it.
+std::vector<double> cuts_toward_ends(int count, double zone, int levels, bool at_start, bool at_end) {
+  std::vector<double> shrinking;
+  for (int k = levels; k-- > 0;) shrinking.push_back(zone * std::pow(edge_factor, k));
+  const double from = at_start && levels > 0 ? zone : 0, to = at_end && levels > 0 ? 1 - zone : 1;
+  std::vector<double> cuts = {0};
+  if (at_start) cuts.insert(cuts.end(), shrinking.begin(), shrinking.end());
+  for (int k = 1; k <= count; ++k) cuts.push_back(std::lerp(from, to, static_cast<double>(k) / count));
+  if (!at_end || levels == 0) return cuts;
+  for (auto k = shrinking.rbegin() + 1; k != shrinking.rend(); ++k) cuts.push_back(1 - *k);
+  cuts.push_back(1);
+  return cuts;
+}
+
+// Walls of rectangular tubes are cut toward their inner edges.
+std::vector<double> cuts_of_ring(const BeamGeometry& boom, const SolidGrading& grading) {
+  std::vector<double> cuts;
+  const bool re_entrant = std::holds_alternative<RectangularTube>(boom.segments.front().start);
+  for (int k = re_entrant ? grading.edge_levels : 1; k-- > 1;) cuts.push_back(std::pow(edge_factor, k) / grading.rings);
+  for (int k = 1; k <= grading.rings; ++k) cuts.push_back(static_cast<double>(k) / grading.rings);
+  return cuts;
+}
+
 // Longer sides of rectangles are cut more often; an element of order p may be p times as long as an element of order 1.
 std::array<int, 2> sectors_of(const BeamGeometry& boom, const SolidOptions& options) {
   const int n = options.grading.sectors;
@@ -215,6 +261,18 @@ std::array<int, 2> sectors_of(const BeamGeometry& boom, const SolidOptions& opti
     sectors[k] = std::max(n, static_cast<int>(std::ceil(n * along / size.minCoeff() / stretch - 1e-9)));
   }
   return sectors;
+}
+
+std::array<std::vector<double>, 4> cuts_of_sides(const BeamGeometry& boom, const SolidOptions& options) {
+  const std::array<int, 2> sectors = sectors_of(boom, options);
+  const bool closed = options.slit == 0;
+  std::array<std::vector<double>, 4> cuts;
+  for (size_t side = 0; side < cuts.size(); ++side) {
+    const double zone = edge_zone(boom, options, side);
+    cuts[side] = cuts_toward_ends(sectors[side % 2], zone, zone > 0 ? options.grading.edge_levels : 0,
+                                  closed || side == 0, closed || side == 3);
+  }
+  return cuts;
 }
 
 // ---- options
@@ -264,6 +322,7 @@ void validate(const BeamGeometry& boom, const SolidOptions& options) {
   require_at_least(g.long_elements, 0, max_divisions, "grading: long_elements");
   require_at_least(g.end_layers, -1, 100, "grading: end_layers");
   require_at_least(g.corner_levels, -1, 20, "grading: corner_levels");
+  require_at_least(g.edge_levels, -1, 20, "grading: edge_levels");
   require(g.first_layer == 0 || (std::isfinite(g.first_layer) && g.first_layer > 0),
           fmt::format("grading: first_layer is {}; it must be positive", g.first_layer));
   require(g.growth == 0 || (std::isfinite(g.growth) && g.growth > 1),
@@ -304,11 +363,20 @@ const Choice& choice_for(const SolidOptions& options) {
 
 // A field that is even about the middle of an element gains nothing from an odd order: two meshes would seem to agree.
 // So no side that bends has one element. The short sides of a slender solid rectangle hardly bend.
-int fewest_sectors(const BeamGeometry& boom) {
+int fewest_sectors(const BeamGeometry& boom, const SolidGrading& grading) {
   const SectionShape& shape = boom.segments.front().start;
-  if (std::holds_alternative<RectangularTube>(shape)) return 2;
+  if (std::holds_alternative<RectangularTube>(shape)) return grading.edge_levels > 0 ? 1 : 2;
   const Eigen::Vector2d size = extent(shape);
   return std::holds_alternative<Rectangle>(shape) && size.maxCoeff() <= longest_element * size.minCoeff() ? 2 : 1;
+}
+
+// A clamp disturbs the stresses of a flat section over its width: so many layers reach that far.
+int layers_over_the_width(const BeamGeometry& boom, const SolidGrading& g) {
+  const SectionShape& shape = boom.segments.front().start;
+  if (!is_rectangle(shape)) return 0;
+  const double first = g.first_layer * end_depth(shape);
+  return static_cast<int>(
+      std::lround(std::log1p((g.growth - 1) * extent(shape).maxCoeff() / first) / std::log(g.growth)));
 }
 
 void choose(const BeamGeometry& boom, SolidOptions& options) {
@@ -316,7 +384,8 @@ void choose(const BeamGeometry& boom, SolidOptions& options) {
   SolidGrading& g = options.grading;
   const SolidGrading& best = choice.grading;
   options.order = choice.order;
-  if (g.sectors == 0) g.sectors = std::max(best.sectors, fewest_sectors(boom));
+  if (g.edge_levels < 0) g.edge_levels = 1;
+  if (g.sectors == 0) g.sectors = std::max(best.sectors, fewest_sectors(boom, g));
   if (g.rings == 0) g.rings = best.rings;
   if (g.long_elements == 0) {
     // More slender booms have the fifth pair of bending modes (wave number 14.14 / L after 11.00 / L) among the first
@@ -324,9 +393,9 @@ void choose(const BeamGeometry& boom, SolidOptions& options) {
     const bool slender = boom.length() > slender_ratio * half_depth(boom.segments.front().start);
     g.long_elements = slender ? static_cast<int>(std::ceil(best.long_elements * 14.14 / 11.0)) : best.long_elements;
   }
-  if (g.end_layers < 0) g.end_layers = best.end_layers;
   if (g.first_layer == 0) g.first_layer = best.first_layer;
   if (g.growth == 0) g.growth = best.growth;
+  if (g.end_layers < 0) g.end_layers = std::max(best.end_layers, layers_over_the_width(boom, g));
   if (g.corner_levels < 0) g.corner_levels = best.corner_levels;
   if (g.factor == 0) g.factor = best.factor;
 }
@@ -344,7 +413,8 @@ SolidOptions chosen(const BeamGeometry& boom, const SolidOptions& options) {
   choose(boom, result);
   // A wall has a singular rim on both faces, which one quadrilateral cannot be refined toward.
   const bool thin = !has_core(boom.segments.front().start);
-  if (thin && result.grading.corner_levels > 0) result.grading.rings = std::max(result.grading.rings, 2);
+  if (thin && result.grading.corner_levels > 0 && cuts_of_ring(boom, result.grading).size() < 2)
+    result.grading.rings = 2;
   return result;
 }
 
@@ -361,7 +431,7 @@ std::optional<SolidOptions> refined(const SolidOptions& complete, int steps) {
   SolidGrading& g = r.grading;
   for (; r.order > max_solid_order; --r.order) g.sectors *= 2, g.rings *= 2, g.long_elements *= 2;
   constexpr int most_levels = 20;
-  g.corner_levels = std::clamp(g.corner_levels + steps, 0, most_levels);
+  g.corner_levels = std::clamp(g.corner_levels + steps, std::min(g.corner_levels, 1), most_levels);
   return r;
 }
 
@@ -373,13 +443,15 @@ BoomPlan plan_of(const BeamGeometry& boom, const SolidOptions& options) {
   place_lines(boom, plan.runs);
   const SectionShape& shape = boom.segments.front().start;
   plan.core = has_core(shape);
-  plan.sectors = sectors_of(boom, plan.options);
+  plan.sides = cuts_of_sides(boom, plan.options);
+  plan.ring_cuts = cuts_of_ring(boom, plan.options.grading);
   place_planes(boom, plan);
   const SolidGrading& grading = plan.options.grading;
   // A rectangle without refined rims needs no rings around its core.
   const bool rings = !std::holds_alternative<Rectangle>(shape) || grading.corner_levels > 0;
   for (BoomLayer& layer : plan.layers) {
-    layer.columns = rings ? plan.runs[static_cast<size_t>(layer.run)].rings * grading.rings : 0;
+    layer.columns =
+        rings ? plan.runs[static_cast<size_t>(layer.run)].rings * static_cast<int>(plan.ring_cuts.size()) : 0;
   }
   place_corners(boom, plan);
   return plan;
@@ -394,7 +466,7 @@ SectionGrid section_at(const BeamGeometry& boom, const BoomPlan& plan, int run_i
   }
   const BeamSegment& segment = boom.segments[static_cast<size_t>(i)];
   SectionGrid grid{interpolate(segment.start, segment.end, std::clamp((x - from) / segment.length, 0.0, 1.0)), {}};
-  grid.uneven = plan.sectors[0] == 1 ? uneven_quarter : 0;
+  grid.uneven = plan.sides[0].size() == 2 ? uneven_quarter : 0;
   const double s = std::clamp((x - run.from) / (run.to - run.from), 0.0, 1.0);
   const bool rings = plan.layers.front().columns > 0;
   for (size_t k = 0; rings && k < run.start_lines.size(); ++k) {

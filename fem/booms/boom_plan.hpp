@@ -25,8 +25,9 @@ struct BoomPlan {
   SolidOptions options;  // nothing left open
   std::vector<BoomRun> runs;
   std::vector<BoomLayer> layers;
-  std::vector<ProfileCorner> corners;   // singular
-  std::array<int, 2> sectors = {1, 1};  // along the sides that face y (0) and z (1)
+  std::vector<ProfileCorner> corners;        // singular
+  std::array<std::vector<double>, 4> sides;  // where sectors of each side end, in [0, 1], the ends included
+  std::vector<double> ring_cuts;             // where quadrilaterals of a ring end, in (0, 1]
   bool core = false;
 };
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <utility>
 
@@ -35,6 +36,11 @@ class Builder {
     return static_cast<int>(profile_.nodes.size()) - 1;
   }
 
+  double tau_of(int column) const {
+    const auto [ring, inside] = std::div(column, static_cast<int>(options_.ring_cuts.size()));
+    return ring + (inside == 0 ? 0 : options_.ring_cuts[static_cast<size_t>(inside) - 1]);
+  }
+
   // Points of column lines and planes. A plane between two runs has those of the wider one.
   void add_vertices() {
     for (size_t plane = 0; plane <= layers_.size(); ++plane) {
@@ -43,7 +49,7 @@ class Builder {
       const BoomLayer& wide = below.columns > above.columns ? below : above;
       std::vector<int>& line = vertices_.emplace_back();
       for (int c = 0; c <= wide.columns; ++c) {
-        line.push_back(add(static_cast<double>(c) / options_.rings, plane == 0 ? below.from : below.to, wide.run));
+        line.push_back(add(tau_of(c), plane == 0 ? below.from : below.to, wide.run));
       }
     }
   }
@@ -146,8 +152,7 @@ class Builder {
 
   void mark_side(int id, int layer) {
     // Lines keep their tau to the last bit: lerp of equal ends is exact.
-    const double outer = static_cast<double>(layers_[static_cast<size_t>(layer)].columns) / options_.rings;
-    if (node(id).tau == outer) profile_.side.push_back(id);
+    if (node(id).tau == tau_of(layers_[static_cast<size_t>(layer)].columns)) profile_.side.push_back(id);
   }
 
   void add_axis() {

@@ -22,9 +22,9 @@ struct ProfileCorner {
 
 struct ProfileOptions {
   int order = 1;
-  int rings = 1;         // columns per ring: tau = column / rings
-  int levels = 0;        // refinements toward the corners
-  double factor = 0.15;  // of each refinement
+  std::vector<double> ring_cuts = {1};  // where the columns of a ring end, in (0, 1]
+  int levels = 0;                       // refinements toward the corners
+  double factor = 0.15;                 // of each refinement
   std::vector<ProfileCorner> corners;
 };
 

@@ -22,12 +22,12 @@ using Eigen::Index;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Lobatto points of `count` equal cells of [0, 1].
-std::vector<double> cell_points(int count, int order) {
+// Lobatto points of the cells between cuts.
+std::vector<double> cell_points(const std::vector<double>& cuts, int order) {
   const Eigen::VectorXd points = lobatto_basis(order).nodes();
-  std::vector<double> all = {0};
-  for (int cell = 0; cell < count; ++cell) {
-    for (int i = 1; i <= order; ++i) all.push_back((cell + (1 + points(i)) / 2) / count);
+  std::vector<double> all = {cuts.front()};
+  for (size_t cell = 0; cell + 1 < cuts.size(); ++cell) {
+    for (int i = 1; i <= order; ++i) all.push_back(std::lerp(cuts[cell], cuts[cell + 1], (1 + points(i)) / 2));
   }
   return all;
 }
@@ -38,13 +38,13 @@ class Lattice {
   Lattice(const BeamGeometry& boom, const BoomPlan& plan)
       : boom_(boom), plan_(plan), order_(plan.options.order), closed_(plan.options.slit == 0) {
     const SolidGrading& g = plan.options.grading;
-    profile_ = make_profile(plan.layers,
-                            {order_, g.rings, plan.corners.empty() ? 0 : g.corner_levels, g.factor, plan.corners});
-    along_y_ = cell_points(plan.sectors[1], order_);
-    along_z_ = cell_points(plan.sectors[0], order_);
-    for (int side = 0; side < 4; ++side) {
-      const std::vector<double>& points = side % 2 == 0 ? along_z_ : along_y_;
-      for (size_t i = 0; i + 1 < points.size(); ++i) around_.push_back(side + points[i]);
+    profile_ = make_profile(
+        plan.layers, {order_, plan.ring_cuts, plan.corners.empty() ? 0 : g.corner_levels, g.factor, plan.corners});
+    along_y_ = cell_points(plan.sides[1], order_);
+    along_z_ = cell_points(plan.sides[0], order_);
+    for (size_t side = 0; side < plan.sides.size(); ++side) {
+      const std::vector<double> points = cell_points(plan.sides[side], order_);
+      for (size_t i = 0; i + 1 < points.size(); ++i) around_.push_back(static_cast<double>(side) + points[i]);
     }
     if (!closed_) around_.push_back(4);
   }

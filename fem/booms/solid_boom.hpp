@@ -17,6 +17,7 @@ struct SolidGrading {
   double growth = 0;       // of one layer to the next, above 1
   int corner_levels = -1;  // refinements toward the rims of clamps and steps
   double factor = 0;       // of each of them, in (0, 1)
+  int edge_levels = -1;    // cuts toward edges along the boom: re-entrant ones, those of slits and of long sides
 };
 
 /// The best that is known of a mesh: that of the finest which SolidOptions choose.
@@ -45,8 +46,8 @@ std::optional<SolidOptions> refined(const SolidOptions& complete, int steps);
 /// on the exact surface; inside an element the geometry is the polynomial through its nodes.
 ///
 /// Where a clamped face ends at a free surface the stress is infinite (for nu = 0.33 it grows like distance^-0.29),
-/// which limits any order; `grading` makes elements small there and at the re-entrant rims of steps. Steps are meshed
-/// between round bars; other sections may change by taper only.
+/// which limits any order; `grading` makes elements small there, at the re-entrant rims of steps and along the inner
+/// edges of rectangular tubes. Steps are meshed between round bars; other sections may change by taper only.
 ///
 /// Node sets: "root", "tip" (their faces), "side" (the outer surface), "tip_center" where a node is there, and one per
 /// named attachment (its reference node). Element sets "segment_1", ... . One SolidProperty per different material.

@@ -101,6 +101,34 @@ TEST(SolidBoom, EverySectionHasItsConstants) {
   }
 }
 
+// Cuts toward edges divide sides and walls; the body stays what it is.
+TEST(SolidBoom, CutsTowardEdgesKeepTheBody) {
+  const auto check = [](const SectionShape& section, double slit) {
+    Index before = 0;
+    double volume = 0;
+    for (const int levels : {0, 1, 2, 3}) {
+      SolidOptions options = of_order(3, 1);
+      options.slit = slit;
+      options.grading.edge_levels = levels;
+      const Mesh mesh = make_solid_mesh(uniform(section), options);
+      EXPECT_NO_THROW(mesh.validate());
+      EXPECT_GT(mesh.nodes.cols(), before) << levels;
+      before = mesh.nodes.cols();
+      const double v = integrals(mesh).volume;
+      if (volume == 0) volume = v;
+      EXPECT_NEAR(v / volume, 1, slit > 0 ? 1e-4 : 1e-12) << levels;  // arcs are cubic polynomials
+    }
+  };
+  check(RectangularTube{0.03, 0.02, 0.0015}, 0);
+  check(RectangularTube{0.03, 0.03, 0.012}, 0);
+  check(Rectangle{0.001, 0.02}, 0);
+  check(Tube{0.02, 0.0005}, 0.001);
+  SolidOptions options = of_order(3, 1);
+  const Index none = make_solid_mesh(uniform(RoundBar{0.01}), options).nodes.cols();
+  options.grading.edge_levels = 3;
+  EXPECT_EQ(make_solid_mesh(uniform(RoundBar{0.01}), options).nodes.cols(), none);  // it has no edges
+}
+
 TEST(SolidBoom, SlitTubeLosesItsSlit) {
   SolidOptions options = of_order(6, 2);
   options.slit = 0.004;
@@ -340,7 +368,7 @@ TEST(SolidBoom, ARefinedMeshHasAHigherOrderAndFinerRims) {
   for (const int steps : {-1, 1, 5}) {
     const SolidOptions other = refined(start, steps).value();
     EXPECT_EQ(other.order, start.order + steps);
-    EXPECT_EQ(other.grading.corner_levels, start.grading.corner_levels + steps);
+    EXPECT_EQ(other.grading.corner_levels, std::max(1, start.grading.corner_levels + steps));  // one is kept
     EXPECT_EQ(other.grading.long_elements, start.grading.long_elements);
   }
   EXPECT_FALSE(refined(start, -3));
