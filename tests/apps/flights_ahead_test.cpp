@@ -36,8 +36,10 @@ TEST_F(FlightsAheadTest, AreTheFlightsThatWouldBeFlown) {
   EXPECT_FALSE(ahead.take(scene, hooks, 1));
   const auto of_scene = ahead.take(scene, hooks), of_finer = ahead.take(finer, hooks, 2);
   ASSERT_TRUE(of_scene && of_finer);
-  EXPECT_EQ(of_scene->outputs.values, run_once(scene, {}).outputs.values);
-  EXPECT_EQ(of_finer->outputs.values, run_once(finer, {}, 2).outputs.values);
+  RunHooks alone;  // with the same bodies: made anew, their shapes differ by round-off
+  alone.bodies = &bodies;
+  EXPECT_EQ(of_scene->outputs.values, run_once(scene, alone).outputs.values);
+  EXPECT_EQ(of_finer->outputs.values, run_once(finer, alone, 2).outputs.values);
   EXPECT_NE(of_finer->outputs.values, of_scene->outputs.values);
   EXPECT_FALSE(ahead.take(scene, hooks)) << "it is taken once";
 }
