@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <set>
 
 namespace flexboom {
@@ -93,10 +94,22 @@ class TreeCheck {
     check_name_among(faults_, path + ".marker", p.marker, std::vector<std::string_view>(names.begin(), names.end()));
   }
 
+  /// Looked at from the start to the end. What has no value between two of these times stops the run there.
+  void value_everywhere(const std::string& path, const std::function<double(double)>& value) {
+    constexpr int looks = 64;
+    if (!(std::isfinite(scene_.duration) && scene_.duration > 0)) return;
+    for (int i = 0; i <= looks; ++i) {
+      const double t = scene_.duration * i / looks;
+      if (const double v = value(t); !std::isfinite(v))
+        return faults_.add(path, fmt::format("is {} at t = {:g} s; it must have a finite value all through the run",
+                                             std::isnan(v) ? "not a number" : "infinite", t));
+    }
+  }
+
   void course(const std::string& path, const CourseScene& c) {
     if (!c.given()) return;
     try {
-      course_of(c, scene_.duration);
+      value_everywhere(path, course_of(c, scene_.duration).function.value);
     } catch (const InputError& error) {
       faults_.add(path, error.what());
     }

@@ -233,6 +233,8 @@ TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
   const struct {
     const char *old, *replacement, *words;
   } cases[] = {
+      {"\"2*sin(t)\"", "\"1/t\"", "drive: is infinite at t = 0 s; it must have a finite value all through the run"},
+      {"\"t*(t<1)\"", "\"sqrt(t - 0.5)\"", "is not a number at t = 0 s; it must have a finite value"},
       {"kind = \"slider\"", "kind = \"slide\"", "joints[0].kind: is \"slide\"; did you mean \"slider\"?"},
       {"a = { body = \"hub\", point = [0, 0, 0.2]", "a = { body = \"hup\", point = [0, 0, 0.2]",
        "joints[1].a.body: is \"hup\"; did you mean \"hub\"?"},
