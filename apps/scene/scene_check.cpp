@@ -51,7 +51,7 @@ void check_times(Faults& faults, const Scene& scene) {
 }
 
 void check_accuracy(Faults& faults, const Scene& scene) {
-  if (scene.integrator_tolerance > scene.tolerance)
+  if (scene.tolerance > 0 && scene.integrator_tolerance > scene.tolerance)
     faults.add("integrator.tolerance",
                fmt::format("is {:g}, looser than the accuracy wanted, {:g}; make it no more than that, or leave it out",
                            scene.integrator_tolerance, scene.tolerance));

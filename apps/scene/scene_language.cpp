@@ -4,6 +4,7 @@
 #include "apps/scene/scene_checks.hpp"
 #include "apps/scene/scene_keys.hpp"
 #include "apps/scene/wanted_accuracy.hpp"
+#include "fem/base/check.hpp"
 
 #include <fmt/format.h>
 
@@ -12,6 +13,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 
 namespace flexboom {
 namespace {
@@ -71,9 +73,12 @@ void starts(Faults& faults, const std::string& path, const std::vector<double>& 
 }
 
 void absolute_errors(Faults& faults, const std::string& path, const std::vector<std::string>& texts, std::string_view) {
+  std::set<std::string> units;
   for (const std::string& text : texts) {
     try {
-      absolute_error(text);
+      const AbsoluteError error = absolute_error(text);
+      require(units.insert(error.unit).second,
+              fmt::format("is '{}', and another error in {} stands before it; leave one", text, error.unit));
     } catch (const InputError& e) {
       faults.add(path, e.what());
     }

@@ -192,6 +192,7 @@ class BadInput(Case):
                 if (option, value) != ("--output-step", "inf"):
                     self.assert_run_refused(option, value, words=key)
         self.assert_run_refused("--vtu-step", "-1", words="vtu_step")
+        self.assert_run_refused("--checkpoint", "nan", words="--checkpoint")
         self.assert_run_refused("--output-step", "1e-9", words="rows")
 
     def test_output_folder_below_a_file(self):

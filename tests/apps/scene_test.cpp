@@ -229,6 +229,8 @@ TEST(Scene, WhatStandsInTheWrongPlaceIsToldWhatCouldStandThere) {
   expect("[[bodies]]\nname = \"boom\"\ndamping = 0.01", "damping: is the number 0.01; it must be a table with rule");
   expect("[[joints]]\nb = \"boom\"", "joints[0].b: is the string \"boom\"; it must be a table with body, marker");
   expect("bodies = [1]", "bodies[0]: is the whole number 1; it must be a table with mass");
+  expect("[accuracy]\nabsolute = [\"1e-9 rad\", \"1e-3 rad\"]",
+         "is '1e-3 rad', and another error in rad stands before it");
   expect("[orbit]\ngravity = 9.81", "orbit.gravity: is the number 9.81; it must be \"none\" or \"differential\"");
   expect("[[joints]]\nkind = 3", "joints[0].kind: is the whole number 3; it must be \"fixed\"");
   // What follows from it is not told.
