@@ -24,7 +24,6 @@ constexpr double unresolved = 0.1;                       // change of a frequenc
 constexpr double round_off = 1e-12;                      // of a frequency by any mesh
 constexpr int most_steps = 3;                            // to finer meshes
 constexpr double usual_fall = 0.5, singular_fall = 0.7;  // of errors, to the next mesh
-constexpr const char* from_coarser = "from the mesh one step coarser";
 
 bool is_solid(const Model& model) { return model.body && model.body->structure == "solid"; }
 
@@ -38,7 +37,7 @@ bool follows_accuracy(const BodyScene& body) {
 }
 
 /// Of errors of one section's meshes; `own`: of the program's choice. Re-entrant edges along the boom are singular, and
-/// no mesh is refined toward them.
+/// a step makes no more cuts toward them.
 double slowest_fall(const SectionShape& section, bool own) {
   constexpr double round_bar = 0.25, tube = 0.4, rectangle = 0.35;
   if (std::holds_alternative<RectangularTube>(section)) return singular_fall;
@@ -94,36 +93,28 @@ FrequencyBounds bounds_of(const ModalBasis& m, const ModalBasis& other, double s
   return r;
 }
 
-/// How far frequencies are from those of the next mesh; where there is none, from those of the mesh one step coarser.
-/// Steps count from `start`, which has `steps` less than `m`. Returns the modes of the next mesh.
-std::optional<BoundedModes> bound(BoundedModes& m, const Model& start, int steps, double fall,
-                                  const EigenOptions& options, int threads) {
-  std::optional<BoundedModes> next = finer(start, steps + 1, options, threads);
-  if (next) {
-    m.bounds = bounds_of(m.basis, next->basis, 1 - fall);
-    return next;
-  }
-  if (const std::optional<BoundedModes> coarser = finer(start, steps - 1, options, threads)) {
-    m.bounds = bounds_of(m.basis, coarser->basis, (1 - fall) / fall);
-    m.bounds.how = from_coarser;
-    m.bound_seconds += seconds_of(*coarser);
-  }
-  return {};
-}
-
-/// Goes on to finer meshes until the accuracy is met, `most` steps at most.
+/// Goes on to finer meshes until the accuracy is met, `most` steps at most. Where there is not one, the bounds are from
+/// the mesh one step coarser.
 BoundedModes climb(BoundedModes here, int most, double fall, const EigenOptions& options, int threads) {
   const Model start = here.model;
+  const auto bound_by_coarser = [fall](BoundedModes& m, const BoundedModes& coarser, double seconds) {
+    m.bounds = bounds_of(m.basis, coarser.basis, (1 - fall) / fall);
+    m.bounds.how = "from the mesh one step coarser";
+    m.bound_seconds += seconds + seconds_of(coarser);
+  };
   for (int steps = 0;; ++steps) {
-    std::optional<BoundedModes> next = bound(here, start, steps, fall, options, threads);
-    if (!next) return here;
+    std::optional<BoundedModes> next = finer(start, steps + 1, options, threads);
+    if (!next) {
+      const std::optional<BoundedModes> coarser = steps == 0 ? finer(start, -1, options, threads) : std::nullopt;
+      if (coarser) bound_by_coarser(here, *coarser, 0);
+      return here;
+    }
+    here.bounds = bounds_of(here.basis, next->basis, 1 - fall);
     if (here.met() == true || steps == most) {
       here.bound_seconds += seconds_of(*next);
       return here;
     }
-    next->bounds = bounds_of(next->basis, here.basis, (1 - fall) / fall);
-    next->bounds.how = from_coarser;
-    next->bound_seconds = here.bound_seconds + seconds_of(here);
+    bound_by_coarser(*next, here, here.bound_seconds);
     here = *std::move(next);
     if (here.met() == true) return here;
   }
@@ -133,8 +124,8 @@ BoundedModes climb(BoundedModes here, int most, double fall, const EigenOptions&
 
 double slowest_fall(const BodyScene& body) {
   if (body.structure != "solid") return usual_fall;
-  const bool own = follows_accuracy(body);
   if (body.solid.slit > 0) return singular_fall;
+  const bool own = follows_accuracy(body);
   double slowest = 0;
   for (const BeamSegment& s : body.geometry.segments)
     slowest = std::max({slowest, slowest_fall(s.start, own), slowest_fall(s.end, own)});

@@ -17,20 +17,19 @@ namespace {
 
 using Eigen::VectorXd;
 
-/// A size of SolidGrading, by the name of its key.
+/// A size of SolidGrading, and its next finer value.
 struct Direction {
-  const char* name;
   int SolidGrading::*size;
   int (*finer)(int);
 };
 
 constexpr std::array<Direction, 6> mesh_sizes = {{
-    {"sectors", &SolidGrading::sectors, [](int n) { return n + 1; }},
-    {"rings", &SolidGrading::rings, [](int n) { return n + 1; }},
-    {"long_elements", &SolidGrading::long_elements, [](int n) { return n + (n + 1) / 2; }},
-    {"end_layers", &SolidGrading::end_layers, [](int n) { return n + 2; }},
-    {"corner_levels", &SolidGrading::corner_levels, [](int n) { return n + 1; }},
-    {"edge_levels", &SolidGrading::edge_levels, [](int n) { return n + 1; }},
+    {&SolidGrading::sectors, [](int n) { return n + 1; }},
+    {&SolidGrading::rings, [](int n) { return n + 1; }},
+    {&SolidGrading::long_elements, [](int n) { return n + (n + 1) / 2; }},
+    {&SolidGrading::end_layers, [](int n) { return n + 2; }},
+    {&SolidGrading::corner_levels, [](int n) { return n + 1; }},
+    {&SolidGrading::edge_levels, [](int n) { return n + 1; }},
 }};
 
 Model finer_in(const Model& model, const Direction& d) {
@@ -50,12 +49,6 @@ double change(const VectorXd& a, const VectorXd& b, int rigid_freedoms) {
   const Eigen::Index n = std::min(a.size(), b.size()) - rigid_freedoms;
   if (n <= 0) return 0;
   return (a.segment(rigid_freedoms, n).array() / b.segment(rigid_freedoms, n).array() - 1).abs().maxCoeff();
-}
-
-/// Is the mesh small enough for one of the next order to be compared with?
-bool has_room(const Model& model) {
-  if (!is_bearable(model.mesh)) return false;
-  return refined_if_bearable(model, 1).has_value();
 }
 
 }  // namespace
@@ -82,7 +75,7 @@ Model tuned(Model model, int rigid_freedoms, double accuracy, const EigenOptions
     tried.clear();
     for (const auto& [moved, d] : effective) {
       Model next = finer_in(model, d);
-      if (!has_room(next)) continue;
+      if (!refined_if_bearable(next, 1)) continue;  // nothing could be compared with it
       model = std::move(next);
       tried.push_back(d);
     }

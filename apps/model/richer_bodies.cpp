@@ -33,7 +33,7 @@ std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions 
   const auto richer = [&](bool in_plane) -> std::optional<ReducedBody> {
     o.basis.in_plane = in_plane;
     for (int more = 8; more >= 0; more -= 2) {
-      o.basis.modes = given + (in_plane || o.basis.name == "hinge" ? more / 2 : more);
+      o.basis.modes = given + (o.basis.name == "hinge" ? more / 2 : more);
       try {
         ReducedBody body = for_comparison(model, o, threads);
         if (body.n() > kept.n()) return body;
