@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <span>
 #include <utility>
 
@@ -32,6 +33,21 @@ std::vector<double> cell_points(const std::vector<double>& cuts, int order) {
   return all;
 }
 
+// Derivatives at Lobatto points of the polynomial through values there (barycentric weights).
+Eigen::MatrixXd differentiation(int order) {
+  const Eigen::VectorXd x = lobatto_basis(order).nodes();
+  Eigen::VectorXd weight = Eigen::VectorXd::Ones(order + 1);
+  Eigen::MatrixXd D = Eigen::MatrixXd::Zero(order + 1, order + 1);
+  for (int i = 0; i <= order; ++i) {
+    for (int j = 0; j <= order; ++j) weight(i) /= i == j ? 1 : x(i) - x(j);
+  }
+  for (int i = 0; i <= order; ++i) {
+    for (int j = 0; j <= order; ++j) D(i, j) = i == j ? 0 : weight(j) / weight(i) / (x(i) - x(j));
+    D(i, i) = -D.row(i).sum();
+  }
+  return D;
+}
+
 // Nodes of all hexahedra of one order: profile nodes times places around the axis, then the inside of the core.
 class Lattice {
  public:
@@ -47,6 +63,7 @@ class Lattice {
       for (size_t i = 0; i + 1 < points.size(); ++i) around_.push_back(static_cast<double>(side) + points[i]);
     }
     if (!closed_) around_.push_back(4);
+    scale_ = equal_area_scale();
   }
 
   // Corners of every hexahedron, with the segment it belongs to.
@@ -66,7 +83,7 @@ class Lattice {
       const ProfileNode& n = profile_.nodes[static_cast<size_t>(i)];
       const SectionGrid grid = section_at(boom_, plan_, n.run, n.x);
       for (Index m = 0; m < turn(); ++m) {
-        nodes.col(i * turn() + m) << n.x, ring_point(grid, around_[static_cast<size_t>(m)], n.tau);
+        nodes.col(i * turn() + m) << n.x, scale_ * ring_point(grid, around_[static_cast<size_t>(m)], n.tau);
       }
     }
     if (!plan_.core) return nodes;
@@ -76,7 +93,7 @@ class Lattice {
       for (int j = 1; j < cells_z(); ++j) {
         for (int i = 1; i < cells_y(); ++i) {
           nodes.col(core_node(i, j, static_cast<int>(l))) << n.x,
-              core_point(grid, along_y_[static_cast<size_t>(i)], along_z_[static_cast<size_t>(j)]);
+              scale_ * core_point(grid, along_y_[static_cast<size_t>(i)], along_z_[static_cast<size_t>(j)]);
         }
       }
     }
@@ -152,6 +169,28 @@ class Lattice {
     }
   }
 
+  // Polynomials through points of a circle enclose another area than the circle. Distances from the axis are scaled so
+  // that they enclose the same: area and second moments are then right to the first order of the difference. Without
+  // it, bending frequencies approach their limit from both sides, and two meshes can agree by accident.
+  double equal_area_scale() const {
+    const SectionGrid grid = section_at(boom_, plan_, 0, 0);
+    if (!std::holds_alternative<RoundBar>(grid.shape) && !std::holds_alternative<Tube>(grid.shape)) return 1;
+    const Eigen::MatrixXd D = differentiation(order_);
+    const Eigen::VectorXd weights = lobatto_weights(order_);
+    const auto circle = [&](Index m) { return ring_point(grid, around_[static_cast<size_t>(m % turn())], 1); };
+    const Index intervals = closed_ ? turn() : turn() - 1;
+    double meshed = 0;  // twice the area between the curve and the axis
+    for (Index start = 0; start < intervals; start += order_) {
+      Eigen::Matrix2Xd points(2, order_ + 1);
+      for (Index i = 0; i <= order_; ++i) points.col(i) = circle(start + i);
+      const Eigen::Matrix2Xd slopes = points * D.transpose();
+      const Eigen::ArrayXXd a = points.array(), b = slopes.array();
+      meshed += (a.row(0) * b.row(1) - a.row(1) * b.row(0)).matrix().dot(weights);
+    }
+    const double angle = 2 * (std::numbers::pi - grid.slit);
+    return std::sqrt(angle * circle(0).squaredNorm() / meshed);
+  }
+
   const BeamGeometry& boom_;
   const BoomPlan& plan_;
   int order_;
@@ -159,6 +198,7 @@ class Lattice {
   Profile profile_;
   std::vector<double> along_y_, along_z_;  // Lobatto points of the core
   std::vector<double> around_;             // u of the places around the axis
+  double scale_ = 1;                       // of distances from the axis
 };
 
 bool same(const Material& a, const Material& b) { return a.E == b.E && a.nu == b.nu && a.rho == b.rho; }
@@ -191,21 +231,6 @@ void add_face_sets(Mesh& mesh, double length) {
   for (const int i : tip) {
     if (mesh.nodes.col(i).tail<2>().norm() <= relative_round_off * length) mesh.node_sets["tip_center"] = {i};
   }
-}
-
-// Derivatives at Lobatto points of the polynomial through values there (barycentric weights).
-Eigen::MatrixXd differentiation(int order) {
-  const Eigen::VectorXd x = lobatto_basis(order).nodes();
-  Eigen::VectorXd weight = Eigen::VectorXd::Ones(order + 1);
-  Eigen::MatrixXd D = Eigen::MatrixXd::Zero(order + 1, order + 1);
-  for (int i = 0; i <= order; ++i) {
-    for (int j = 0; j <= order; ++j) weight(i) /= i == j ? 1 : x(i) - x(j);
-  }
-  for (int i = 0; i <= order; ++i) {
-    for (int j = 0; j <= order; ++j) D(i, j) = i == j ? 0 : weight(j) / weight(i) / (x(i) - x(j));
-    D(i, i) = -D.row(i).sum();
-  }
-  return D;
 }
 
 // Shares of nodes in the area of their section, by Gauss-Lobatto quadrature over the ends of cells.

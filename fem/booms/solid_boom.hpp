@@ -42,8 +42,10 @@ SolidOptions chosen(const BeamGeometry&, const SolidOptions&);
 /// grading. Empty: there is none so coarse.
 std::optional<SolidOptions> refined(const SolidOptions& complete, int steps);
 
-/// Hexahedra (or tetrahedra from cutting them) on the exact geometry of a boom, in the axes of BeamGeometry. Nodes lie
-/// on the exact surface; inside an element the geometry is the polynomial through its nodes.
+/// Hexahedra (or tetrahedra from cutting them) on the exact geometry of a boom, in the axes of BeamGeometry. Inside an
+/// element the geometry is the polynomial through its nodes. Nodes of flat surfaces lie on them. Those of round
+/// surfaces are a little off, all by one factor: the polynomials enclose the area of the circle, so mass is exact for
+/// any order.
 ///
 /// Where a clamped face ends at a free surface the stress is infinite (for nu = 0.33 it grows like distance^-0.29),
 /// which limits any order; `grading` makes elements small there, at the re-entrant rims of steps and along the inner

@@ -146,6 +146,27 @@ Eigen::Matrix3d inertia_of(const Eigen::Matrix3d& W) {
   return W.trace() * Eigen::Matrix3d::Identity() - (W + W.transpose()) / 2;
 }
 
+/// Has a symmetric matrix no entries beside its diagonal but round-off?
+bool is_diagonal(const Eigen::MatrixXd& A) {
+  const Eigen::ArrayXd scale = A.diagonal().array().abs().sqrt();
+  const Eigen::ArrayXXd beside = A - Eigen::MatrixXd(A.diagonal().asDiagonal());
+  return (beside.abs() <= relative_round_off * (scale.matrix() * scale.matrix().transpose()).array()).all();
+}
+
+/// De that damps every mode phi of (Ke, Me) by 2 zeta omega: sum over modes of 2 zeta omega Me phi phi^T Me, with
+/// phi^T Me phi = 1 (Clough, Penzien, Dynamics of Structures, section 12-3).
+Eigen::MatrixXd modal_damping(const ReducedBody& body, double zeta) {
+  if (is_diagonal(body.Ke) && is_diagonal(body.Me)) {
+    const Eigen::ArrayXd stiffness = body.Ke.diagonal().array().max(0.0);
+    return (2 * zeta * (stiffness * body.Me.diagonal().array()).sqrt()).matrix().asDiagonal();
+  }
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(body.Ke, body.Me);
+  const Eigen::VectorXd omega = modes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::MatrixXd momenta = body.Me * modes.eigenvectors();
+  const Eigen::MatrixXd D = momenta * (2 * zeta * omega).asDiagonal() * momenta.transpose();
+  return (D + D.transpose()) / 2;
+}
+
 }  // namespace
 
 void ReducedBody::validate() const {
@@ -222,10 +243,8 @@ void apply_damping(ReducedBody& body, const DampingRule& rule) {
   if (rule.name == "none") {
     body.De.setZero(body.n(), body.n());
   } else if (rule.name == "modal" || rule.name == "loss-factor") {
-    // 2 zeta omega_k Me_kk with omega_k = sqrt(Ke_kk / Me_kk); a loss factor eta damps a resonance as zeta = eta / 2.
-    const double zeta = rule.name == "modal" ? rule.value : rule.value / 2;
-    const Eigen::ArrayXd stiffness = body.Ke.diagonal().array().max(0.0);
-    body.De = (2 * zeta * (stiffness * body.Me.diagonal().array()).sqrt()).matrix().asDiagonal();
+    // A loss factor eta damps a resonance as zeta = eta / 2.
+    body.De = modal_damping(body, rule.name == "modal" ? rule.value : rule.value / 2);
   } else if (rule.name == "rayleigh") {
     body.De = rule.alpha * body.Me + rule.beta * body.Ke;
   } else {

@@ -128,8 +128,9 @@ ReducedBody rigid_body(std::string name, double m, const Eigen::Vector3d& mc0, c
 /// Marker of that name. @throws InputError listing those that exist.
 const Marker& marker(const ReducedBody&, const std::string& name);
 
-/// How De is made. "modal": De_kk = 2 zeta omega_k Me_kk. "loss-factor": the same with zeta = value / 2.
-/// "rayleigh": De = alpha Me + beta Ke. "none": zero.
+/// How De is made. "modal": 2 zeta omega for every mode of (Ke, Me), which is De_kk = 2 zeta omega_k Me_kk where the
+/// coordinates are those modes. "loss-factor": the same with zeta = value / 2. "rayleigh": De = alpha Me + beta Ke.
+/// "none": zero.
 struct DampingRule {
   std::string name = "none";
   double value = 0;  // zeta or eta [-]

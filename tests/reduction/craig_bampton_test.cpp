@@ -231,8 +231,8 @@ TEST(CraigBampton, ReferenceNodesStandForFacesOfSolids) {
     S << end.S, end.S_theta;
     const MatrixXd compliance = S * body.Ke.ldlt().solve(S.transpose());
     for (Index i = 0; i < 6; ++i) EXPECT_NEAR(compliance(i, i) / full(i, i), 1, 1e-10) << connection << " " << i;
-    // A rigid face is stiffer.
-    EXPECT_NEAR(full(1, 1) / (std::pow(0.302, 3) / (3 * 67e9 * 4.908738521234052e-10)), 1, 0.02);
+    // A rigid face is stiffer, and so are six quadratic elements: by 3.5 %.
+    EXPECT_NEAR(full(1, 1) / (std::pow(0.302, 3) / (3 * 67e9 * 4.908738521234052e-10)), 0.965, 0.01);
     for (const BodyCheck& c : check_invariants(body, mesh, assembly, basis))
       EXPECT_TRUE(c.passed) << connection << " " << c.name << " " << c.relative_error;
   }

@@ -98,6 +98,19 @@ TEST(Damping, ModalRatioIsTwoZetaOmegaMe) {
   EXPECT_EQ(body.De(0, 1), 0);
 }
 
+TEST(Damping, ModalRatioIsThatOfTheModesWhateverTheCoordinates) {
+  ReducedBody modes = sample();
+  apply_damping(modes, {"modal", 0.05});
+  ReducedBody mixed = modes;  // q = T y, as the static shapes of Craig-Bampton are sums of modes
+  Eigen::MatrixXd T = Eigen::MatrixXd::Identity(4, 4);
+  T << 1, 0.4, 0, -0.2, 0.3, 1, 0.1, 0, -0.5, 0, 2, 0.7, 0, 0.6, -0.1, 1;
+  mixed.Me = T.transpose() * modes.Me * T;
+  mixed.Ke = T.transpose() * modes.Ke * T;
+  apply_damping(mixed, {"modal", 0.05});
+  const Eigen::MatrixXd expected = T.transpose() * modes.De * T;
+  EXPECT_LT((mixed.De - expected).norm(), 1e-13 * expected.norm());
+}
+
 TEST(Damping, LossFactorIsTwiceTheRatio) {
   ReducedBody a = sample();
   ReducedBody b = sample();
