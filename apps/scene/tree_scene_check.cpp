@@ -5,6 +5,7 @@
 #include "apps/scene/scene_checks.hpp"
 #include "apps/scene/scene_keys.hpp"
 #include "apps/scene/scene_law.hpp"
+#include "dynamics/numerics/expression.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 #include <cmath>
 #include <functional>
 #include <set>
+#include <utility>
 
 namespace flexboom {
 namespace {
@@ -153,8 +155,43 @@ class TreeCheck {
       faults_.add(path + ".closes_loop", "is true, so the start of the joint follows from the others; drop its own");
   }
 
+  /// A jump of the rate would need an impulse, which no integrator sees between two of its times.
+  void rate_without_jumps(const std::string& path, const CourseScene& c) {
+    constexpr int looks = 1024;
+    if (!c.given() || !(std::isfinite(scene_.duration) && scene_.duration > 0)) return;
+    TimeCourse course;
+    try {
+      course = course_of(c, scene_.duration);
+      if (!c.expression.empty()) course.corners = Expression(c.expression).corners(0, scene_.duration, looks);
+    } catch (const InputError&) {
+      return;  // a fault of its own
+    }
+    const double near = 1e-9 * scene_.duration;
+    double fastest = 0;
+    for (int i = 0; i <= looks; ++i)
+      fastest = std::max(fastest, std::abs(course.function.rate(scene_.duration * i / looks)));
+    for (const double t : course.corners) {
+      if (!(t > near && t < scene_.duration - near)) continue;
+      const auto [before, after] = std::pair(course.function.rate(t - near), course.function.rate(t + near));
+      const double step = course.function.value(t + near) - course.function.value(t - near);
+      const double steepest = std::max(std::abs(before), std::abs(after));
+      const double bent =
+          std::max(std::abs(course.function.acceleration(t - near)), std::abs(course.function.acceleration(t + near)));
+      if (std::abs(step) > 4 * near * steepest + 1e-9 * std::abs(course.function.value(t)))
+        return faults_.add(path,
+                           fmt::format("jumps by {:.4g} at t = {:.6g} s; a joint cannot, it needs a ramp", step, t));
+      if (std::abs(after - before) > 4 * near * bent + 1e-6 * fastest)
+        return faults_.add(path, fmt::format("has a rate that jumps from {:.4g} to {:.4g} at t = {:.6g} s, which takes "
+                                             "an impulse; round the corner, or give a profile (\"smooth\")",
+                                             before, after, t));
+    }
+  }
+
   void motion(const std::string& path, const JointScene& j, const JointType& type) {
-    for (const CourseScene& c : j.motion) course(path + ".motion", c);
+    for (const CourseScene& c : j.motion) {
+      course(path + ".motion", c);
+      rate_without_jumps(path + ".motion", c);
+    }
     if (j.motion.empty()) return;
     if (type.scalars == 0)
       faults_.add(path + ".motion",

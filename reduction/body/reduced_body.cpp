@@ -154,7 +154,7 @@ bool is_diagonal(const Eigen::MatrixXd& A) {
 }
 
 /// De that damps every mode phi of (Ke, Me) by 2 zeta omega: sum over modes of 2 zeta omega Me phi phi^T Me, with
-/// phi^T Me phi = 1 (Clough, Penzien, Dynamics of Structures, section 12-3).
+/// phi^T Me phi = 1 (Clough and Penzien, Dynamics of Structures, on proportional damping matrices).
 Eigen::MatrixXd modal_damping(const ReducedBody& body, double zeta) {
   if (is_diagonal(body.Ke) && is_diagonal(body.Me)) {
     const Eigen::ArrayXd stiffness = body.Ke.diagonal().array().max(0.0);

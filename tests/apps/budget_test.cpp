@@ -106,7 +106,7 @@ TEST_P(Budget, CountsTheStretchOfASlenderBar) {
     Scene scene = held_bar("fixed", 9.81, 0, diameter, 10, 6);
     scene.outputs = {"bar.tip"};
     const RunResult r = run(scene);
-    EXPECT_NEAR(r.budget.truncation, 1, 0.1);
+    EXPECT_NEAR(r.budget.truncation, 1.25, 0.1);  // all of the tip, and a quarter for what is left out still
     const OutputErrors& tip = r.budget.outputs.front();
     // Let go at once, a bar stretches to twice its length under its weight, rho g L^2 / 2 E; one shape alone falls
     // short.
@@ -138,7 +138,8 @@ TEST(BudgetOfAHub, CountsTheModesThatEq14LeavesOut) {
   for (BodyScene& b : scene.bodies) b.modes = 10;
   scene.error_budget = false, scene.tolerance = 1e-8;
   const double error = largest(compare_outputs(one.outputs, run_scene(scene, {}).outputs, scene.outputs));
-  EXPECT_NEAR(one.budget.truncation, error, 0.3 * error);  // modes beyond the next four take a sixth of it back
+  EXPECT_GE(one.budget.truncation, error);
+  EXPECT_LE(one.budget.truncation, 1.6 * error);  // modes beyond the next four take a sixth of it back
 }
 
 // The load of a pin converges as 1 / n: the next four modes show a part of what all others do.
@@ -210,6 +211,72 @@ TEST(BudgetOfATree, CountsWhatGeometricStiffnessChanges) {
   EXPECT_LT(on.budget.linearisation, 1e-3);
 }
 
+/// A strip of 3 m on a free hub, cut into some strips on fixed joints: these turn by large angles.
+Scene strips_on_a_hub(int count) {
+  std::string text = R"toml(format = "flexboom-scene-1"
+name = "strips"
+duration = 4.0
+output_step = 0.02
+[accuracy]
+tolerance = 1e-5
+outputs = ["hub.rate", "c0.torque"]
+[[bodies]]
+name = "hub"
+mass = 2.0
+inertia = [0.3, 0.3, 0.3]
+[[wheels]]
+name = "w"
+body = "hub"
+axis = [0.0, 0.0, 1.0]
+inertia = 0.01
+torque = "-0.2*sin(pi*t)*(t<1)"
+[[joints]]
+kind = "free"
+b = { body = "hub" }
+)toml";
+  for (int k = 0; k < count; ++k) {
+    const std::string place =
+        k == 0 ? R"(body = "hub", point = [0.1, 0.0, 0.0])" : fmt::format(R"(body = "c{}", marker = "tip")", k - 1);
+    text += fmt::format(R"(
+[[bodies]]
+name = "c{0}"
+damping = {{ rule = "rayleigh", alpha = 0.0, beta = 2e-3 }}
+modes = 4
+stiffening = "on"
+corrections = ["tip.Fx", "tip.Fy", "tip.Mz"]
+[[bodies.segments]]
+shape = "rectangle"
+height = 0.003
+width = 0.03
+length = {1}
+material = {{ E = 70e9, nu = 0.33, rho = 2700.0 }}
+[[joints]]
+name = "c{0}"
+kind = "fixed"
+a = {{ {2} }}
+b = {{ body = "c{0}", marker = "root" }}
+loads = true
+)",
+                        k, 3.0 / count, place);
+  }
+  return parse_scene(text, "strips.toml");
+}
+
+TEST(BudgetOfATree, VibrationsOfLargeAmplitudeAreLate) {
+  Scene one = strips_on_a_hub(1), chain = strips_on_a_hub(6);
+  chain.error_budget = false;
+  const RunResult r = run_scene(one, {}), truth = run_scene(chain, {});
+  const auto differences = compare_outputs(r.outputs, truth.outputs, one.outputs);
+  ASSERT_EQ(differences.size(), 2U);
+  for (const OutputDifference& d : differences) {
+    const auto said = std::ranges::find(r.budget.outputs, d.name, &OutputErrors::name);
+    ASSERT_NE(said, r.budget.outputs.end());
+    EXPECT_GT(d.error, 5e-3) << d.name;
+    EXPECT_GE(said->linearisation, d.error) << d.name;
+    EXPECT_LE(said->linearisation, 3 * d.error) << d.name;
+  }
+}
+
 /// The stiffness of a body may hardly change where a load at its root does: what counts is the outputs.
 TEST(BudgetOfATree, GeometricStiffnessThatCountsIsInTheRunThatIsKept) {
   Scene scene = load_scene("flexible-appendage");
@@ -218,8 +285,8 @@ TEST(BudgetOfATree, GeometricStiffnessThatCountsIsInTheRunThatIsKept) {
   scene.error_budget = true;
   const RunResult left_open = run_scene(scene, {});
   EXPECT_EQ(left_open.tree->stiffening(1), Stiffening::on);
-  EXPECT_LT(left_open.budget.time, 1e-5);  // no part of what stiffness changes
-  EXPECT_LT(left_open.budget.linearisation, 1e-4);
+  EXPECT_LT(left_open.budget.time, 1e-5);           // no part of what stiffness changes
+  EXPECT_LT(left_open.budget.linearisation, 2e-4);  // vibrations that are late
   for (BodyScene& b : scene.bodies)
     if (!b.stiffening.empty()) b.stiffening = "off";
   const RunResult off = run_scene(scene, {});

@@ -235,6 +235,9 @@ TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
   } cases[] = {
       {"\"2*sin(t)\"", "\"1/t\"", "drive: is infinite at t = 0 s; it must have a finite value all through the run"},
       {"\"t*(t<1)\"", "\"sqrt(t - 0.5)\"", "is not a number at t = 0 s; it must have a finite value"},
+      {"\"0.1*t^2\", 0.2", "\"0.1*min(t, 0.3)\", 0.2",
+       "motion: has a rate that jumps from 0.1 to 0 at t = 0.3 s, which takes an impulse; round the corner"},
+      {"\"0.1*t^2\", 0.2", "\"0.1*(t > 0.2)\", 0.2", "motion: jumps by 0.1 at t = 0.2 s; a joint cannot"},
       {"kind = \"slider\"", "kind = \"slide\"", "joints[0].kind: is \"slide\"; did you mean \"slider\"?"},
       {"a = { body = \"hub\", point = [0, 0, 0.2]", "a = { body = \"hup\", point = [0, 0, 0.2]",
        "joints[1].a.body: is \"hup\"; did you mean \"hub\"?"},

@@ -118,8 +118,9 @@ TEST(ModeAlignment, PairsOfARoundSolidBar) {
   const Mesh mesh = make_solid_mesh(boom4(BeamTheory::timoshenko, true), options);
   for (const MakeBody& make : {MakeBody(clamped), MakeBody(held_twice)}) {
     const ReducedBody body = make(mesh, "arpack");
-    EXPECT_LT(difference(body, make(mesh, "block")), 1e-9);
-    EXPECT_LT(difference(body, make(renumbered(mesh, 3), "arpack")), 1e-9);
+    // 1e-9 by round-off of pairs, which the order of the unknowns changes.
+    EXPECT_LT(difference(body, make(mesh, "block")), 3e-9);
+    EXPECT_LT(difference(body, make(renumbered(mesh, 3), "arpack")), 3e-9);
   }
 }
 
