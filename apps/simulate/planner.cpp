@@ -19,6 +19,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 namespace flexboom {
@@ -333,7 +334,18 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
     const double before = std::exchange(truncation_, worst->truncation);
     const bool is_far = truncation_ > before / 2 && truncation_ > not_near * scene.tolerance;
     const bool stays = truncation_ > 0.9 * before;  // what more modes cannot mend: a direction that is left out
-    if (costly_ || hopeless_ || is_far || stays || candidates_ >= most_candidates) return false;
+    const std::string_view why = costly_     ? "flights with more take too many steps"
+                                 : hopeless_ ? "nearly all are needed, and one fewer is far too few"
+                                 : is_far    ? "it falls too slowly"
+                                 : stays     ? "more modes do not change it"
+                                 : candidates_ >= most_candidates ? "there are as many as are tried"
+                                                                  : "";
+    if (!why.empty()) {
+      plan.push_back(
+          fmt::format("truncation: {:.1e} in {}; more modes are not tried: {} (modes = n takes as many as wanted)",
+                      worst->truncation, worst->name, why));
+      return false;
+    }
     candidates_ = std::min(candidates_ + candidates_ / 2, most_candidates);
     note_shown(scene, hooks);
     too_few_ = kept_ + 1;
