@@ -241,8 +241,10 @@ void joint_keys(Archive& a, JointScene& j) {
         not_negative);
   a.key({"threshold", "rad, m", "angle or length of that stop"}, m.threshold, finite);
   a.key({"drive", "N m, N", "torque or force of a motor in a hinge or a slider, function of time"}, j.drive);
-  a.key({"motion", "rad, m", "prescribed angle or length, function of time; two in an array for a universal joint"},
-        j.motion);
+  a.key(
+      {"motion", "rad, m",
+       "prescribed angle or length, function of time without jumps of its rate; two in an array for a universal joint"},
+      j.motion);
   a.key({"start", "rad, m", "of a hinge or slider (number) or a universal joint (two in an array)", false,
          "`rest` of a spring, or 0"},
         j.start, starts);
