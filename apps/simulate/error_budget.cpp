@@ -109,8 +109,11 @@ struct Repeats {
     return fly(other, hooks, refine, bearable_steps(run));
   }
 
+  std::vector<OutputDifference> difference(const OutputTable& a, const OutputTable& b, const Scene& scene) const {
+    return compare_outputs(without_coordinates(a), without_coordinates(b), scene.outputs, floors);
+  }
   std::vector<OutputDifference> difference(const Run& run, const Run& other, const Scene& scene) const {
-    return compare_outputs(without_coordinates(run.outputs), without_coordinates(other.outputs), scene.outputs, floors);
+    return difference(run.outputs, other.outputs, scene);
   }
 
   /// Differences of the outputs of another flight. Those that count must not be its own errors of time, which contacts
@@ -288,9 +291,7 @@ double linearisation_error(const Scene& scene, Scene& flown, Run& run, Measuring
     differences.clear();
     if (leaves_stiffening_out(run)) differences = m.repeats.change(run, with_stiffening(flown));
   }
-  Run late;
-  late.outputs = with_late_vibrations(run, flown);
-  add(differences, m.repeats.difference(run, late, flown));
+  add(differences, m.repeats.difference(run.outputs, with_late_vibrations(run, flown), flown));
   double deflection = 0;
   for (const Bending& b : run.bending) deflection = std::max(deflection, b.of_length);
   return m.enter(&OutputErrors::linearisation, {differences}, deflection * deflection);

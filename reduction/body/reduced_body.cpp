@@ -2,6 +2,7 @@
 
 #include "fem/base/check.hpp"
 #include "fem/base/round_off.hpp"
+#include "reduction/body/diagonal.hpp"
 #include "reduction/body/tilde.hpp"
 
 #include <Eigen/Cholesky>
@@ -144,13 +145,6 @@ void validate_stiffening(const ReducedBody& body, const Checker& c) {
 /// -sum dm (tilde(a) tilde(b) + tilde(b) tilde(a)) / 2 = tr W I - sym W of W = sum dm a b^T.
 Eigen::Matrix3d inertia_of(const Eigen::Matrix3d& W) {
   return W.trace() * Eigen::Matrix3d::Identity() - (W + W.transpose()) / 2;
-}
-
-/// Has a symmetric matrix no entries beside its diagonal but round-off?
-bool is_diagonal(const Eigen::MatrixXd& A) {
-  const Eigen::ArrayXd scale = A.diagonal().array().abs().sqrt();
-  const Eigen::ArrayXXd beside = A - Eigen::MatrixXd(A.diagonal().asDiagonal());
-  return (beside.abs() <= relative_round_off * (scale.matrix() * scale.matrix().transpose()).array()).all();
 }
 
 /// De that damps every mode phi of (Ke, Me) by 2 zeta omega: sum over modes of 2 zeta omega Me phi phi^T Me, with
