@@ -269,9 +269,9 @@ void add(std::vector<OutputDifference>& sum, const std::vector<OutputDifference>
 }
 
 /// What geometric stiffness changes where it is left out, and what then is left out still: the square of the
-/// deflection, and vibrations whose frequency depends on it. Where it changes too much and the scene leaves it open, a
-/// run with it takes the place of `run`.
-double linearisation_error(const Scene& scene, Scene& flown, Run& run, Measuring& m) {
+/// deflection, and vibrations whose frequency depends on it. Where it changes too much and the scene leaves it open,
+/// the scene has it from then on, and a run with it takes the place of `run`.
+double linearisation_error(Scene& scene, Scene& flown, Run& run, Measuring& m) {
   if (const ReducedBody* body = any_without_stiffness(run, flown)) {
     m.missing("linearisation", fmt::format("body {} has no geometric stiffness", body->name));
     return unknown;
@@ -285,6 +285,8 @@ double linearisation_error(const Scene& scene, Scene& flown, Run& run, Measuring
   const double bearable = scene.tolerance / 3;
   if (largest(differences) > bearable && any_open_stiffening(scene, flown)) {
     flown = with_stiffening_left_open(scene, std::move(flown));
+    scene = with_stiffening_left_open(scene, scene);
+    m.budget.has_stiffened = true;
     run = all_stiffening_is_on(flown) ? std::move(stiffened) : run_once(flown, m.repeats.hooks);
     m.plan.push_back(fmt::format("geometric stiffness changes the outputs by {:.1e}: the run that is kept has it",
                                  largest(differences)));
@@ -398,7 +400,7 @@ ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::v
     if (!has_beyond || std::exchange(beyond_what, to_toml(flown)) == beyond_what) return;
     give_up_ahead(hooks);
     const double found = measured("truncation", [&] {
-      beyond = modes_beyond(scene, flown, still, budget, hooks);
+      beyond = modes_beyond(scene, flown, budget.has_stiffened ? StillKinds{} : still, budget, hooks);
       if (beyond) fly_ahead(beyond->scene, hooks, 0, bearable_steps(run));
       return 0.0;
     });

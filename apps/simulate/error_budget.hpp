@@ -32,8 +32,9 @@ std::vector<std::string> wanted_pointings(const Scene&);
 std::string settle_pointing(Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan);
 
 /// Repeats a run with a tighter integrator, more modes in and out of the hinge plane, and a finer mesh, and compares
-/// the outputs wanted. Where the integrator has to be tighter, that run takes the place of `run`, and the scene gets
-/// its tolerance. What is known not to move is no part of more modes.
+/// the outputs wanted. Where the integrator has to be tighter, or geometric stiffness to be on, that run takes the
+/// place of `run`, and the scene says so. What is known not to move is no part of more modes, unless geometric
+/// stiffness is switched on: it couples kinds of modes that are independent without.
 /// @throws InputError, NumericalError as run_scene.
 ErrorBudget measure_budget(Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan,
                            const StillKinds& still = {});

@@ -92,6 +92,7 @@ struct ErrorBudget {
   std::vector<OutputErrors> outputs;
   std::vector<std::string> missing;  // which part was not measured and why, one line each
   bool measured = false;             // false: the repeats were not run, or not to their end
+  bool has_stiffened = false;        // geometric stiffness that the scene leaves open was switched on
 
   /// The output with the largest known errors; nullptr where there is none.
   const OutputErrors* worst() const;

@@ -29,7 +29,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double unmoved = 1e-10;    // of the largest displacement: round-off of one that is zero
+constexpr double unmoved = 1e-12;    // of the largest displacement: round-off of one that is zero
 constexpr int most_candidates = 96;  // per body
 constexpr int fewest = 4;            // candidates per body
 constexpr int for_budget = 8;        // modes beside the candidates that show their truncation
@@ -219,7 +219,7 @@ bool Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::strin
     scene = std::move(other), has_chosen = true;
     given.integrator_tolerance = scene.integrator_tolerance;
     const bool is_enough = choice->needed < (given.error_budget ? nearly_all : 1);
-    hopeless_ = given.error_budget && !is_enough && choice->error_of_fewer > not_near * scene.tolerance;
+    hopeless_ = given.error_budget && !is_enough && step > 0 && choice->error_of_fewer > not_near * scene.tolerance;
     if (is_enough || hooks.stopped()) return true;
     if (step == most_doublings || costly_ || hopeless_ || 2 * candidates_ > most_candidates) break;
     candidates_ *= 2;
@@ -321,6 +321,7 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
 
 bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {
   const OutputErrors* worst = budget.worst();
+  if (budget.has_stiffened) still_.clear();  // geometric stiffness couples kinds
   if (open_.empty() || !budget.measured || budget.within(scene.tolerance) || worst == nullptr || hooks.stopped() ||
       steps_++ >= most_rounds)
     return false;

@@ -159,17 +159,23 @@ void warn_of_the_balance(const IntegrationSummary& s, RunResult& r) {
       fmt::format("{}: more than ten times the tolerance, {:.1e}, so {}", balances(s), r.scene.tolerance, consequence));
 }
 
-/// Modes that bend out of the hinge plane, twist and stretch are left out where the scene says so.
+/// Modes that bend out of the hinge plane, twist and stretch are left out where the scene says so. A jump of a load
+/// reaches a joint as a wave, and no number of modes has its front.
 std::string help_with_truncation(const RunResult& r) {
+  constexpr double of_fronts = 0.1;
   const OutputErrors* worst = r.budget.worst();
   if (worst == nullptr || !(worst->truncation > r.scene.tolerance / 2)) return "";
   std::vector<std::string> names;
   for (const BodyScene& b : r.scene.bodies)
     if (b.is_boom() && b.structure != "rigid" && b.structure != "eq14" && b.directions != "all")
       names.push_back(b.name);
-  if (names.empty()) return "";
-  return fmt::format("; {} {} modes of the hinge plane alone, and directions = \"all\" takes the others in",
-                     fmt::join(names, ", "), names.size() == 1 ? "has" : "have");
+  if (!names.empty())
+    return fmt::format("; {} {} modes of the hinge plane alone, and directions = \"all\" takes the others in",
+                       fmt::join(names, ", "), names.size() == 1 ? "has" : "have");
+  if (!is_load(worst->name) || !(worst->truncation > of_fronts)) return "";
+  return "; where a load or a motion sets in at once, loads of joints follow within the time of a wave through the "
+         "body, "
+         "and no number of modes resolves that: let it rise over some periods of the body, or name other outputs";
 }
 
 /// What a user must not overlook.

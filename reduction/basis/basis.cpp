@@ -6,6 +6,7 @@
 #include "reduction/basis/craig_bampton.hpp"
 #include "reduction/basis/hinge_basis.hpp"
 #include "reduction/basis/mean_axis.hpp"
+#include "reduction/eigen/orthogonal_basis.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -71,11 +72,17 @@ ModalBasis hinge_basis(const Mesh& mesh, const BasisModel& m, const BasisOptions
   const HingeSpring hinge = {.axis = o.hinge_axis, .stiffness = o.hinge_stiffness};
   ModalBasis turning = hinge_adapted_modes(mesh, m.assembly, m.clamp, hinge, o.modes, eigen_options(o), threads);
   if (o.in_plane) return turning;
-  const ModalBasis beside =
-      clamped_modes_of_kind(mesh, m.assembly, m.clamp, o.modes, kinds_beside(o.hinge_axis), eigen_options(o));
-  MatrixXd shapes(turning.Phi.rows(), turning.Phi.cols() + beside.Phi.cols());
-  shapes << turning.Phi, beside.Phi;
-  ModalBasis all = ritz_modes(mesh, m.assembly, m.clamp, shapes, 0, threads);
+  // Where directions are coupled, modes that turn the root are modes beside them, too.
+  constexpr double told_apart = 1e-5;
+  MassBasis shapes(m.assembly.M, turning.Phi.cols() + o.modes);
+  shapes.append(turning.Phi, told_apart);
+  const std::vector<ModeKind> kinds = kinds_beside(o.hinge_axis);
+  for (int first = 0, wanted = o.modes; first < wanted;) {
+    const ModalBasis beside = clamped_modes_of_kind(mesh, m.assembly, m.clamp, wanted, kinds, eigen_options(o));
+    shapes.append(beside.Phi.rightCols(wanted - first), told_apart);
+    first = std::exchange(wanted, wanted + static_cast<int>(shapes.capacity() - shapes.size()));
+  }
+  ModalBasis all = ritz_modes(mesh, m.assembly, m.clamp, shapes.vectors(), 0, threads);
   all.unknowns = turning.unknowns;
   all.summary.note = turning.summary.note;
   return all;

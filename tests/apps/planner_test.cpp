@@ -181,6 +181,30 @@ TEST(Planner, WhatNothingMovesIsNoPartOfTheTruncation) {
   EXPECT_GT(std::abs(none - all), 0.1 * all) << "a kind that moves is missed";
 }
 
+// A torque along a bar twists it. Geometric stiffness makes it shorter then, which moves the hub by its axial mode: a
+// kind that nothing moves without. A scene that leaves the stiffness open has it, and the modes, or says what is
+// missing.
+TEST(Planner, GeometricStiffnessCouplesKindsOfModes) {
+  Scene scene = spun_about("z", 1e-3);
+  scene.duration = 0.5, scene.output_step = 0.005, scene.outputs = {"fly.velocity"};
+  BodyScene& boom = scene.bodies[1];
+  boom.directions = "all", boom.directions_given = true;
+  boom.geometry.attachments.push_back(
+      {.name = "bar", .position = 0.9, .mass = 0.01, .inertia = Eigen::Vector3d(1e-4, 5e-5, 5e-5).asDiagonal()});
+  scene.loads[0].at = {.body = "boom", .marker = "bar"};
+  scene.loads[0].torque = {};
+  scene.loads[0].torque[0].expression = "1e-3*(t<0.2)";
+  const RunResult r = run_scene(scene, {});
+  EXPECT_EQ(r.scene.bodies[1].stiffening, "on") << "a plan that is kept has it";
+  EXPECT_TRUE(kinds_of(r).contains("axial"));
+  Scene full = scene;
+  full.tolerance = 1e-8, full.error_budget = false;
+  full.bodies[1].modes_auto = false, full.bodies[1].modes = 60, full.bodies[1].stiffening = "on";
+  const double error = largest(compare_outputs(r.outputs, run_scene(full, {}).outputs, scene.outputs, {}));
+  EXPECT_GT(r.budget.total(), error);
+  EXPECT_LT(r.budget.total(), 3 * error);
+}
+
 TEST(Planner, ThePlanIsPartOfTheSceneThatWasRun) {
   const RunResult r = run_scene(spun_about("z", 1e-3), {});
   EXPECT_FALSE(r.scene.bodies[1].modes_auto);

@@ -2,6 +2,7 @@
 
 #include "fem/base/check.hpp"
 #include "fem/booms/solid_boom.hpp"
+#include "reduction/basis/basis.hpp"
 #include "reduction/invariants/certificate.hpp"
 #include "reduction/invariants/eq14.hpp"
 #include "reduction/invariants/inertia_invariants.hpp"
@@ -240,6 +241,29 @@ TEST(HingeAdapted, ClampedModesConvergeLikeTheSeventhPower) {
   const ReducedBody two = reduce(boom.mesh, boom.assembly,
                                  adapted(boom, {0, 0, 1}, {stiffness_of(2, free_side), stiffness_of(2, closed)}), "b");
   EXPECT_LT(std::abs(sprung_hz(two, {0, 0, 1}, stiffness_of(2, closed))(0) / hz_of(2, closed, 1) - 1), 1e-10);
+}
+
+// A tip mass beside the axis makes every mode bend, twist and turn the root: shapes of the hinge and those beside them
+// are told apart, and as many as wanted are found.
+TEST(HingeAdapted, AllDirectionsOfABodyWhoseDirectionsAreCoupled) {
+  BeamGeometry g = line_boom(2);
+  const Eigen::Matrix3d inertia = 1e-6 * Eigen::Matrix3d::Identity();
+  g.attachments.push_back(
+      {.name = "mass", .position = 0.295, .mass = 0.05, .inertia = inertia, .offset = {0, 0.05, 0.02}});
+  Mesh mesh = make_mesh(g);
+  for (const int count : {1, 2, 4}) {
+    BasisOptions o;
+    o.name = "hinge", o.modes = count, o.hinge_stiffness = {0.05, 50};
+    const BasisModel model = basis_model(mesh, o, node_set(mesh, "root"));
+    const ModalBasis basis = make_basis(mesh, model, o);
+    EXPECT_EQ(basis.Phi.cols(), 3 * count) << basis.summary.note;
+    const ReducedBody body = reduce(mesh, model.assembly, basis, "boom");
+    for (const BodyCheck& c : body_checks(body)) EXPECT_TRUE(c.passed) << count << " " << c.name << c.value;
+    const double exact = sprung_hz(
+        reduce(mesh, model.assembly, clamped_modes(mesh, model.assembly, model.clamp, {.num_modes = 30}), "boom"),
+        {0, 0, 1}, 0.05)(0);
+    EXPECT_NEAR(sprung_hz(body, {0, 0, 1}, 0.05)(0) / exact, 1, 1e-7) << count;
+  }
 }
 
 TEST(HingeAdapted, BadHingesAreRefused) {
