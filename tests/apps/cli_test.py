@@ -30,6 +30,9 @@ BOOMS = ("efield_plus", "efield_minus", "sip", "slp")
 OK, USAGE, INPUT, NUMERICAL, CHECK_FAILED, INTERRUPTED = 0, 2, 3, 4, 5, 130
 PROGRAM = os.environ.get("FLEXBOOM_PROGRAM", "flexboom")
 
+# Cases that compute for seconds: sanitizers, for which they would be minutes, find the same code in others.
+long_case = unittest.skipIf("FLEXBOOM_LEAVE_OUT_LONG_TESTS" in os.environ, "long")
+
 
 def flexboom(*arguments, **options):
     """Runs the program to its end; stdout and stderr as text."""
@@ -258,6 +261,7 @@ class BadInput(Case):
                 self.assert_refused("report", bad, words=f"{bad / name}: it is a device, pipe or socket, not a file")
                 shutil.rmtree(bad)
 
+    @long_case
     def test_large_scenes_are_checked_in_little_memory(self):
         def checked(text, code, words):
             scene = self.folder / "large.toml"
@@ -566,9 +570,10 @@ class RunFiles(Case):
             self.assertEqual(budget[part], max(o[part] or 0 for o in budget["outputs"].values()), part)
         self.assertTrue(all(isinstance(line, str) for line in document["plan"]))
 
+    @long_case
     def test_verify_holds_the_run_against_others(self):
         """What is estimated is what runs that share little with this one say."""
-        result = flexboom("run", "sport", "--duration", "0.3", "--tolerance", "1e-4", "--verify", "--out", self.folder / "out")
+        result = flexboom("run", "sport", "--duration", "0.1", "--tolerance", "1e-4", "--verify", "--out", self.folder / "out")
         self.assert_exit(OK, result)
         self.assertEqual(result.stdout.count("verify, "), 6)
         summary = self.summary(self.folder / "out")
@@ -582,6 +587,11 @@ class RunFiles(Case):
                 if part:
                     self.assertLess(output["difference"], 3 * budget[name][part] + 1e-5, (what, name))
         self.assertFalse([n for n in checks["all at onceall at once"]["outputs"] if n.endswith(".q")])
+
+    def test_verify_of_a_scene_with_joints(self):
+        result = flexboom("run", "panel-slew", "--duration", "0.5", "--tolerance", "1e-3", "--verify", "--out", self.folder / "out")
+        self.assert_exit(OK, result)
+        self.assertEqual(result.stdout.count("verify, "), 6)
 
     def test_budget_not_measured_is_null(self):
         budget = self.summary(self.run_sport("--duration", "0.1"))["error_budget"]
@@ -940,6 +950,7 @@ class Solids(Case):
         self.assert_exit(OK, flexboom("mesh", source, "-o", file, "--quiet", *arguments))
         return file
 
+    @long_case
     def test_a_solid_body_has_the_modes_of_three_dimensional_elasticity(self):
         document = self.modes(BOOM4, "--structure", "solid", "--accuracy", "1e-4")
         np.testing.assert_allclose(document["frequencies_hz"], BOOM4_SOLID_HZ, rtol=1e-4)
@@ -952,6 +963,7 @@ class Solids(Case):
         self.assertTrue((errors <= bounds).all(), np.array([errors, bounds]))
         return bounds.max()
 
+    @long_case
     def test_a_mesh_is_refined_until_its_bounds_are_within_the_accuracy(self):
         # order 7, four levels of refined rims: good to 1e-7, by its change from order 6
         exact = np.array(BOOM4_SOLID_HZ)
@@ -971,6 +983,7 @@ class Solids(Case):
         self.assertGreater(self.assert_bounds_hold(document, np.array(BOOM4_SOLID_HZ)), 1e-6)
         self.assertIn("was not reached, or not proven: the bound is", result.stderr)
 
+    @long_case
     def test_bounds_of_thin_walls_hold(self):
         body = self.folder / "walls.toml"
         body.write_text(RECTANGULAR_TUBE)
@@ -979,6 +992,7 @@ class Solids(Case):
         # order 6, three elements per side: good to 1e-4, by its change from order 5
         self.assert_bounds_hold(document, np.array([134.4498036, 185.6202468]))
 
+    @long_case
     def test_what_lies_above_an_unresolved_mode_has_no_bound(self):
         # Modes 8 and 9 of both meshes are 5 % too high: the wall has others below, which neither resolves.
         body = self.folder / "short.toml"
@@ -1004,11 +1018,13 @@ class Solids(Case):
             other = self.mesh(deck, name)
             np.testing.assert_allclose(self.modes(other, *clamp)["frequencies_hz"], hz, rtol=1e-9, err_msg=name)
 
+    @long_case
     def test_nothing_held_is_a_free_body(self):
         document = self.modes(BOOM4, "--structure", "solid", "--accuracy", "1e-2", "--free", "--count", "8")
         self.assertEqual(document["rigid_freedoms"], 6)
         self.assertEqual(document["kinds"][:6], ["rigid"] * 6)
 
+    @long_case
     def test_completeness_is_proven_when_asked(self):
         arguments = (BOOM4, "--structure", "solid", "--accuracy", "1e-2")
         self.assertGreaterEqual(self.modes(*arguments, "--verify", "sturm")["sturm_count"], 6)
@@ -1073,6 +1089,7 @@ class Bench(Case):
         self.assertIn("exponential", (out / "bench_transient.csv").read_text())
         self.assertIn("<svg", (out / "bench_transient.svg").read_text())
 
+    @long_case
     def test_transient_of_a_closed_loop_has_the_reference_that_round_off_allows(self):
         scene = self.folder / "short.toml"
         scene.write_text((MESHES / "slider-crank.toml").read_text().replace("duration = 0.25", "duration = 0.02"))
@@ -1085,6 +1102,7 @@ class Bench(Case):
             self.assertLess(row["error"], 30 * row["tolerance"], row)
             self.assertGreater(row["tolerance"], 9 * row["reference_tolerance"], row)
 
+    @long_case
     def test_transient_of_a_scene_with_joints(self):
         result = flexboom("bench", "transient", "two-link-arm", "--longest", "0.001", "--json", "--out", self.folder)
         self.assert_exit(OK, result)
@@ -1342,6 +1360,7 @@ start_angle = 1.0
         self.assert_exit(OK, result)
         return json.loads(result.stdout)["error_budget"]
 
+    @long_case
     def test_the_file_tells_the_errors_of_a_run(self):
         coarse = self.folder / "coarse.toml"  # elements of order 3
         coarse.write_text(re.sub(r"(?m)^order = .*$", "order = 3", BOOM4.read_text()))
