@@ -52,8 +52,8 @@ class InterruptGuard {
   std::array<struct sigaction, signals.size()> before_ = {};
 };
 
-/// One line on a terminal: percent, simulated / wall time, time left. Silent for work under a second and where stderr
-/// is no terminal.
+/// One line on a terminal: percent, simulated / wall time, time left of a flight. A plan and an error budget take many
+/// flights; nobody knows how many. Silent for work under a second and where stderr is no terminal.
 class ProgressLine {
  public:
   explicit ProgressLine(bool wanted) : wanted_(wanted && isatty(STDERR_FILENO) == 1) {}
@@ -65,21 +65,32 @@ class ProgressLine {
 
   void operator()(double time, double duration) {
     if (!wanted_) return;
+    using seconds = std::chrono::duration<double>;
     const auto now = std::chrono::steady_clock::now();
-    const double wall = std::chrono::duration<double>(now - start_).count();
-    if (wall < 1 || now - last_ < std::chrono::milliseconds(200)) return;
-    last_ = now;
+    if (time < time_ || flights_ == 0) {
+      ++flights_;
+      start_of_flight_ = now, first_ = time;
+    }
+    time_ = time;
+    if (time == first_ || now - start_ < std::chrono::seconds(1) || now - shown_at_ < std::chrono::milliseconds(200))
+      return;
+    shown_at_ = now;
     shown_ = true;
-    const std::string line =
+    const double wall = seconds(now - start_of_flight_).count();
+    std::string line =
         fmt::format("{:.0f} %  {:.3g} of {:.3g} s simulated in {:.1f} s, {:.3g} s left", 100 * time / duration, time,
-                    duration, wall, wall * (duration - time) / std::max(time, 1e-12));
-    std::fputs(fmt::format("\r{:79}", line).c_str(), stderr);
+                    duration, wall, wall * (duration - time) / (time - first_));
+    if (flights_ > 1) line = fmt::format("flight {} ({:.0f} s):  {}", flights_, seconds(now - start_).count(), line);
+    std::fputs(fmt::format("\r{:79.79}", line).c_str(), stderr);
     std::fflush(stderr);
   }
 
  private:
+  using Time = std::chrono::steady_clock::time_point;
   bool wanted_, shown_ = false;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_ = start_;
+  int flights_ = 0;
+  double first_ = 0, time_ = 0;  // simulated, of the first call of this flight and of the last one [s]
+  Time start_ = std::chrono::steady_clock::now(), start_of_flight_ = start_, shown_at_ = start_;
 };
 
 void override_modes(Scene& scene, const std::string& text) {

@@ -444,6 +444,18 @@ class Streams(Case):
         self.assertRegex(after, r"^\r {79}\r\S", "the line must be gone before anything else is printed")
         self.assertNotIn("\x1b", seen)
 
+    @long_case
+    def test_the_progress_of_a_plan_counts_its_flights(self):
+        """Time left is that of the flight, whatever came before it."""
+        code, seen = self.on_terminal("run", "wing-satellite", "--modes", "auto", "--tolerance", "1e-4", "--out", self.folder / "out",
+                                      interrupt_after=6)
+        self.assertIn(code, (OK, INTERRUPTED))
+        shown = re.findall(r"flight (\d+) \(\d+ s\): *(\d+) % .* simulated in ([\d.]+) s, ([^ ]+) s left", seen)
+        self.assertTrue(shown, seen)
+        for _, percent, wall, left in shown:
+            if int(percent) > 20:
+                self.assertLess(float(left), 6 * float(wall) + 1)
+
     def test_no_progress_line_for_short_work_or_json_or_quiet(self):
         out = self.folder / "out"
         code, seen = self.on_terminal("run", "sport", "--no-budget", "--duration", "0.2", "--out", out)
