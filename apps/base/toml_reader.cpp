@@ -111,7 +111,17 @@ bool TableReader::is_text(std::string_view key) {
 double TableReader::number(std::string_view key, std::optional<double> otherwise) {
   if (otherwise && !has(key)) return *otherwise;
   const Value* value = find(key, Kind::number, true);
-  return value ? value->number : nan;
+  if (!value || !is_bearable(*value, key)) return nan;
+  return value->number;
+}
+
+bool TableReader::is_bearable(const Value& value, std::string_view key) {
+  constexpr double most = 1e30;  // ten of them can be multiplied
+  const bool bearable = !(std::abs(value.number) > most) || !std::isfinite(value.number);
+  if (!bearable)
+    faults_->add(path(key), value.place,
+                 fmt::format("is the number {}; no quantity in SI units is beyond {}", value.number, most));
+  return bearable;
 }
 
 int TableReader::integer(std::string_view key, std::optional<int> otherwise) {
@@ -152,7 +162,7 @@ bool TableReader::numbers(const Value& array, std::string_view key, double* out)
   for (const Value& item : array.items) {
     if (!is_number(item))
       faults_->add(path(key), item.place, "has an entry that " + found(item) + "; it must be a number");
-    if (!is_number(item)) return false;
+    if (!is_number(item) || !is_bearable(item, key)) return false;
     *out++ = item.number;
   }
   return true;
@@ -161,9 +171,9 @@ bool TableReader::numbers(const Value& array, std::string_view key, double* out)
 std::vector<double> TableReader::numbers(std::string_view key) {
   const Value* value = find(key);
   if (!value) return {};
-  if (is_number(*value)) return {value->number};
+  if (is_number(*value)) return {number(key)};
   std::vector<double> result;
-  for (const Value& item : value->items) result.push_back(item.number);
+  for (const Value& item : value->items) result.push_back(is_bearable(item, key) ? item.number : nan);
   if (value->kind != Kind::array || !std::ranges::all_of(value->items, is_number))
     fault(key, "must be a number or an array of numbers");
   return result;

@@ -77,6 +77,8 @@ class TableReader {
   /// The value of a key if it is there and of that kind; faults otherwise.
   const Value* find(std::string_view key, Value::Kind, bool required);
   bool numbers(const Value& array, std::string_view key, double* out);
+  /// Is a number no larger than any quantity? Else it is a fault. What is not finite is for its key to judge.
+  bool is_bearable(const Value&, std::string_view key);
   TableReader in_place_of(const Value& other, std::string path);
 
   const Value* table_;
