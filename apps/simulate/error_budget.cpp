@@ -139,15 +139,17 @@ struct Measuring {
     budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
   }
 
-  /// Enters what a repeat has changed in each output, and `more` of the largest value of each. Returns the largest.
-  double enter(Part part, const Finding& finding, double more = 0) {
+  /// Enters what a repeat has changed in each output, and `more` of the largest value of each that is no `given`
+  /// function of time. Returns the largest.
+  double enter(Part part, const Finding& finding, double more = 0, const std::vector<std::string>& given = {}) {
     double most = 0;
     for (OutputErrors& o : budget.outputs) {
       const auto d = std::ranges::find(finding.differences, o.name, &OutputDifference::name);
       const bool is_known = d != finding.differences.end();
       const double error = is_known ? finding.factor * d->error : 0, before = worst_part(o);
       if (is_known) o.scale = std::max(o.scale, d->scale), o.size = std::max(o.size, d->size);
-      o.*part = error + (o.scale > 0 ? more * o.size / o.scale : 0);
+      const bool is_given = std::ranges::find(given, o.name) != given.end();
+      o.*part = error + (o.scale > 0 && !is_given ? more * o.size / o.scale : 0);
       if (error > before) o.when = d->time;
       most = std::max(most, o.*part);
     }
@@ -296,7 +298,7 @@ double linearisation_error(Scene& scene, Scene& flown, Run& run, Measuring& m) {
   add(differences, m.repeats.difference(run.outputs, with_late_vibrations(run, flown), flown));
   double deflection = 0;
   for (const Bending& b : run.bending) deflection = std::max(deflection, b.of_length);
-  return m.enter(&OutputErrors::linearisation, {differences}, deflection * deflection);
+  return m.enter(&OutputErrors::linearisation, {differences}, deflection * deflection, prescribed_outputs(scene));
 }
 
 }  // namespace

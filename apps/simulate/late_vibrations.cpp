@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 #include <string>
+#include <vector>
 
 namespace flexboom {
 
@@ -57,26 +58,53 @@ std::map<std::string, ArrayXd> lags_of(const Run& run, const Scene& scene) {
   return lags;
 }
 
+/// A time between two rows: after `before`, by a share of the way to the next one.
+struct Ago {
+  Index before = 0;
+  double share = 0;
+};
+
+/// What was a lag ago, at each row.
+std::vector<Ago> rows_ago(const OutputTable& table, const ArrayXd& lag) {
+  const auto time = table.values.col(0);
+  std::vector<Ago> rows(static_cast<size_t>(lag.size()));
+  Index before = 0;
+  for (Index row = 1; row < lag.size(); ++row) {
+    const double t = time[row] - lag[row];
+    while (before + 1 < row && time[before + 1] <= t) ++before;
+    const double from = time[before], to = time[before + 1];
+    rows[static_cast<size_t>(row)] = {before, to > from ? std::clamp((t - from) / (to - from), 0.0, 1.0) : 1};
+  }
+  return rows;
+}
+
 }  // namespace
 
+std::vector<std::string> prescribed_outputs(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const JointScene& j : scene.joints)
+    for (const char* what : {".angle", ".length", ".angle1", ".angle2", ".rate", ".rate1", ".rate2"})
+      if (!j.motion.empty()) names.push_back(j.name + what);
+  return names;
+}
+
 OutputTable with_late_vibrations(const Run& run, const Scene& scene) {
-  const std::map<std::string, ArrayXd> lags = lags_of(run, scene);
   const OutputTable& now = run.outputs;
+  std::map<std::string, std::vector<Ago>> ago;
+  for (const auto& [name, lag] : lags_of(run, scene)) ago[name] = rows_ago(now, lag);
+  const std::vector<std::string> given = prescribed_outputs(scene);
   OutputTable late = now;
   for (size_t i = 0; i < now.names.size(); ++i) {
-    const auto of_name = lags.find(now.names[i].substr(0, now.names[i].find('.')));
-    const ArrayXd& lag = of_name != lags.end() ? of_name->second : lags.at("");
+    const std::string& name = now.names[i];
+    if (name == "t" || is_coordinate(name) || std::ranges::find(given, name) != given.end()) continue;
+    const auto of_name = ago.find(name.substr(0, name.find('.')));
+    const std::vector<Ago>& rows = of_name != ago.end() ? of_name->second : ago.at("");
     const auto column = static_cast<Index>(i);
-    if (now.names[i] == "t") continue;
-    Index before = 0;  // the last row that is not after the time looked for
-    for (Index row = 1; row < now.values.rows(); ++row) {
-      const double t = now.values(row, 0) - lag[row];
-      while (before + 1 < row && now.values(before + 1, 0) <= t) ++before;
-      const double from = now.values(before, 0), to = now.values(before + 1, 0);
-      const double a = now.values(before, column), b = now.values(before + 1, column);
-      const bool jumps = std::abs(b - a) > std::numbers::pi && now.names[i].find(".rotation.") != std::string::npos;
-      if (!jumps && to > from)
-        late.values(row, column) = std::lerp(a, b, std::clamp((t - from) / (to - from), 0.0, 1.0));
+    const bool turns = name.find(".rotation.") != std::string::npos;
+    for (size_t row = 1; row < rows.size(); ++row) {
+      const double a = now.values(rows[row].before, column), b = now.values(rows[row].before + 1, column);
+      const bool jumps = turns && std::abs(b - a) > std::numbers::pi;
+      if (!jumps) late.values(static_cast<Index>(row), column) = std::lerp(a, b, rows[row].share);
     }
   }
   return late;

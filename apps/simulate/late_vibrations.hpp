@@ -4,6 +4,9 @@
 #include "apps/simulate/output_errors.hpp"
 #include "apps/simulate/simulate.hpp"
 
+#include <string>
+#include <vector>
+
 namespace flexboom {
 
 /// The outputs of a run as they may be where frequencies depend on the amplitude, which linear elasticity leaves out.
@@ -14,5 +17,8 @@ namespace flexboom {
 /// 1.3 % to 50 %, 4 s to 160 s; a panel, 0.36 %, 60 s. The true difference is 0.6 to 0.7 of this, in the outputs that
 /// differ most.
 OutputTable with_late_vibrations(const Run&, const Scene&);
+
+/// Outputs that no theory changes: what joints of prescribed motion do.
+std::vector<std::string> prescribed_outputs(const Scene&);
 
 }  // namespace flexboom

@@ -277,6 +277,17 @@ TEST(BudgetOfATree, VibrationsOfLargeAmplitudeAreLate) {
   }
 }
 
+TEST(BudgetOfATree, MotionsThatAreGivenHaveNoErrorOfTheory) {
+  Scene scene = load_scene("spin-up");
+  scene.duration = 5, scene.tolerance = 1e-2, scene.error_budget = true;
+  const RunResult r = run_scene(scene, {});
+  for (const char* name : {"shaft.angle", "shaft.rate", "shaft.drive"}) {
+    const auto said = std::ranges::find(r.budget.outputs, name, &OutputErrors::name);
+    ASSERT_NE(said, r.budget.outputs.end());
+    EXPECT_EQ(said->linearisation == 0, !is_load(name)) << name;
+  }
+}
+
 /// The stiffness of a body may hardly change where a load at its root does: what counts is the outputs.
 TEST(BudgetOfATree, GeometricStiffnessThatCountsIsInTheRunThatIsKept) {
   Scene scene = load_scene("flexible-appendage");
