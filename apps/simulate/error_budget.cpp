@@ -336,11 +336,14 @@ std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const Ou
     std::vector<OutputDifference> differences = compare_outputs(run.outputs, finer.outputs, flown.outputs, floors);
     const double error = largest(differences);
     if (!(error < std::exchange(before, error) / 5)) --asked.digits;
-    if (error <= asked.bearable || asked.digits <= 0 || hooks.stopped() || tight.step_tolerance() < least_tolerance)
+    const double balance = run.motion.summary.energy_balance;
+    const bool is_settled = error <= asked.bearable && !(balance > asked.balance);
+    if (is_settled || asked.digits <= 0 || hooks.stopped() || tight.step_tolerance() < least_tolerance)
       return differences;
+    const std::string energies = error <= asked.bearable ? fmt::format("energy balance {:.1e}, ", balance) : "";
     plan.push_back(fmt::format(
-        "time integration: changed by {:.1e} at a tenth of the tolerance {:.0e}; the integrator gets {:.0e}", error,
-        flown.step_tolerance(), tight.step_tolerance()));
+        "time integration: {}changed by {:.1e} at a tenth of the tolerance {:.0e}; the integrator gets {:.0e}",
+        energies, error, flown.step_tolerance(), tight.step_tolerance()));
     run = std::move(finer);
     flown = tight;
   }
@@ -412,8 +415,8 @@ ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::v
   budget.linearisation = measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
   look_beyond();
   budget.time = measured("time", [&] {
-    const Settling asked{scene.tolerance / 3, 2};  // a third: there are other errors
-    constexpr double of_tighter = 1.15;            // a flight with a digit more has a tenth of the error left
+    const Settling asked{scene.tolerance / 3, 2, bearable_balance(scene.tolerance)};  // others come
+    constexpr double of_tighter = 1.15;  // a flight with a digit more has a tenth of the error left
     return m.enter(&OutputErrors::time,
                    {settle_time_error(flown, run, m.repeats.floors, asked, hooks, m.plan), of_tighter});
   });

@@ -3,6 +3,7 @@
 #include "apps/simulate/modes_beyond.hpp"
 #include "apps/simulate/simulate.hpp"
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -15,9 +16,11 @@ long bearable_steps(const Run&);
 struct Settling {
   double bearable;  // the largest difference of the outputs
   int digits;       // more of the integrator, at most; those that take four fifths of the difference away do not count
+  double balance = std::numeric_limits<double>::infinity();  // the largest energy balance
 };
 
-/// Repeats a run ten times tighter until its outputs change no more than is bearable. `run` is then the last but one,
+/// Repeats a run ten times tighter until its outputs change no more than is bearable, and what enters and leaves is
+/// what its energies say: steps that are right for the outputs may leave powers out. `run` is then the last but one,
 /// `flown` has the tolerance of its integrator, and `plan` says so. Returns the last differences.
 /// @throws InputError, NumericalError as run_scene.
 std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors&, Settling, const RunHooks&,

@@ -149,14 +149,14 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
 /// Errors that no budget measures still show in what the motion conserves. Energies are none of the outputs that a
 /// budget measures: their powers may vibrate faster than the steps of an exact method need to follow.
 void warn_of_the_balance(const IntegrationSummary& s, RunResult& r) {
-  constexpr double allowed = 10;  // times the tolerance: the factor that a run without a budget promises
-  if (!(s.energy_balance > allowed * r.scene.tolerance || s.momentum_drift > allowed * r.scene.tolerance)) return;
+  const double allowed = bearable_balance(r.scene.tolerance);
+  if (!(s.energy_balance > allowed || s.momentum_drift > allowed)) return;
   const std::string_view consequence =
       r.budget.measured ? "energies may be off by as much, though the error budget of the outputs is what it says; a "
                           "smaller tolerance helps"
                         : "outputs may be off by as much; a smaller tolerance helps, and an error budget measures them";
   r.warnings.push_back(
-      fmt::format("{}: more than ten times the tolerance, {:.1e}, so {}", balances(s), r.scene.tolerance, consequence));
+      fmt::format("{}: more than the {:.1e} that go with the tolerance, so {}", balances(s), allowed, consequence));
 }
 
 /// Modes that bend out of the hinge plane, twist and stretch are left out where the scene says so. A jump of a load
@@ -228,9 +228,10 @@ std::string balances(const IntegrationSummary& s) {
                      error_text(s.momentum_drift));
 }
 
+double bearable_balance(double tolerance) { return std::min(10 * tolerance, broken_balance); }
+
 bool is_balanced(const IntegrationSummary& s) {
-  constexpr double broken = 0.01;  // far above any tolerance that is accepted for a step
-  return s.energy_balance <= broken && !(s.momentum_drift > broken);  // which may be unknown
+  return s.energy_balance <= broken_balance && !(s.momentum_drift > broken_balance);  // which may be unknown
 }
 
 RunResult run_scene(const Scene& given, const RunHooks& asked,
