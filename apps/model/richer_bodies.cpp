@@ -5,6 +5,7 @@
 #include "apps/model/bounded_modes.hpp"
 #include "apps/model/static_shapes.hpp"
 #include "fem/base/check.hpp"
+#include "fem/base/text_reader.hpp"
 
 #include <fmt/format.h>
 
@@ -22,14 +23,30 @@ ReducedBody for_comparison(Model model, const ReductionOptions& o, int threads) 
   return body;
 }
 
+/// Static shapes of the loads at every marker that moves and is no interface; of more than a few markers none, for each
+/// takes six shapes.
+std::vector<std::string> static_shapes_of_markers(const Model& model, const ReductionOptions& o,
+                                                  const ReducedBody& kept) {
+  constexpr size_t few = 4;
+  std::vector<std::string> places, shapes;
+  const auto is_wanted = [&](const std::string& name) {
+    return o.loads_at.empty() ||
+           std::ranges::any_of(o.loads_at, [&](const std::string& set) { return same_but_case(set, name); });
+  };
+  for (const Marker& m : kept.markers)
+    if (model.mesh.node_sets.contains(m.name) && can_load(kept, m.name) && is_wanted(m.name)) places.push_back(m.name);
+  if (places.size() > few) return {};
+  for (const std::string& place : places)
+    for (std::string& shape : static_shapes_at(place)) shapes.push_back(std::move(shape));
+  return shapes;
+}
+
 /// With as many more modes as the elements have, eight at most; with those of all directions beside a plane's, where
 /// the hinge lets them be told apart.
 std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions o, const ReducedBody& kept,
                                            int threads) {
   o.select.reset();
   const int given = o.basis.modes;
-  if (o.basis.name == "clamped" && !o.basis.in_plane && model.body && !model.clamped.empty())
-    add_static_shapes(o.basis.corrections, static_shapes_at(model.clamped == "tip" ? "root" : "tip"));
   const auto richer = [&](bool in_plane) -> std::optional<ReducedBody> {
     o.basis.in_plane = in_plane;
     for (int more = 8; more >= 0; more -= 2) {
@@ -44,7 +61,12 @@ std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions 
     return {};
   };
   const bool in_plane = o.basis.in_plane;
+  const std::vector<std::string> shapes = static_shapes_of_markers(model, o, kept), own = o.basis.corrections;
+  add_static_shapes(o.basis.corrections, shapes);
   if (std::optional<ReducedBody> all = richer(false)) return all;
+  o.basis.corrections = own;  // a node set of one node of a solid bears no torque
+  if (!shapes.empty())
+    if (std::optional<ReducedBody> all = richer(false)) return all;
   return in_plane ? richer(true) : std::nullopt;
 }
 

@@ -23,20 +23,56 @@ std::vector<std::string> static_shapes_at(const std::string& node_set) {
   return shapes;
 }
 
-std::vector<std::string> static_shapes_of_loads(const Scene& scene, const BodyScene& body) {
-  std::vector<std::string> sets, shapes;
+namespace {
+
+/// Has a place coordinates of its own, which hold the static shapes of its loads?
+bool is_interface(const BodyScene& body, const std::string& marker) {
+  return body.basis.name == "craig-bampton" && std::ranges::any_of(body.basis.interfaces, [&](const std::string& text) {
+           return same_but_case(text.substr(0, text.find(':')), marker);
+         });
+}
+
+/// Where joints, springs and loads of a scene act on a body, by its markers.
+std::vector<std::string> loaded_markers(const Scene& scene, const std::string& body) {
+  std::vector<std::string> markers;
   const auto note = [&](const PlaceScene& place) {
-    const bool is_held = place.marker == body.clamp && body.basis.name != "mean-axis";
-    if (place.body != body.name || place.marker.empty() || is_held) return;
-    if (std::ranges::find(sets, place.marker) == sets.end()) sets.push_back(place.marker);
+    if (place.body != body || place.marker.empty()) return;
+    if (std::ranges::find(markers, place.marker) == markers.end()) markers.push_back(place.marker);
   };
   for (const JointScene& joint : scene.joints) note(joint.a), note(joint.b);
   for (const HingeScene& hinge : scene.hinges) note({.body = hinge.body, .marker = "root"});
   for (const SpringScene& spring : scene.springs) note(spring.a), note(spring.b);
   for (const LoadScene& load : scene.loads) note(load.at);
-  for (const std::string& set : sets)
-    for (std::string& shape : static_shapes_at(set)) shapes.push_back(std::move(shape));
+  return markers;
+}
+
+}  // namespace
+
+std::vector<std::string> static_shapes_of_loads(const Scene& scene, const BodyScene& body) {
+  std::vector<std::string> shapes;
+  for (const std::string& marker : loaded_markers(scene, body.name)) {
+    const bool is_held = marker == body.clamp && body.basis.name != "mean-axis";
+    if (is_held || is_interface(body, marker)) continue;
+    for (std::string& shape : static_shapes_at(marker)) shapes.push_back(std::move(shape));
+  }
   return shapes;
+}
+
+bool can_load(const ReducedBody& body, const std::string& name) {
+  const bool is_interface = std::ranges::find(body.interfaces, name, &Interface::name) != body.interfaces.end();
+  const auto marker = std::ranges::find(body.markers, name, &Marker::name);
+  return !is_interface && marker != body.markers.end() && marker->S.norm() + marker->S_theta.norm() > 0;
+}
+
+std::vector<std::string> loads_without_shapes(const Scene& scene, const BodyScene& body) {
+  if (!body.reduced || !body.richer || !body.richer->more_modes) return {};
+  std::vector<std::string> markers = loaded_markers(scene, body.name);
+  std::erase_if(markers, [&](const std::string& marker) {
+    return !can_load(*body.reduced, marker) ||
+           std::ranges::any_of(body.richer->more_modes->coordinates,
+                               [&](const Coordinate& c) { return c.kind == "attachment" && c.interface == marker; });
+  });
+  return markers;
 }
 
 void add_static_shapes(std::vector<std::string>& corrections, const std::vector<std::string>& shapes) {

@@ -20,6 +20,13 @@ std::vector<std::string> static_shapes_at(const std::string& node_set);
 /// shape as 1 / n^5.
 std::vector<std::string> static_shapes_of_loads(const Scene&, const BodyScene&);
 
+/// Has a load at a marker of a reduced body a static shape of its own? Not where the marker stands still in the frame
+/// of the body, or is an interface, whose coordinates hold it.
+bool can_load(const ReducedBody&, const std::string& marker);
+
+/// Markers of a body from a file where loads of the scene act and its body with more modes has no static shapes.
+std::vector<std::string> loads_without_shapes(const Scene&, const BodyScene&);
+
 /// Adds those that are not there; names of node sets compare without case.
 void add_static_shapes(std::vector<std::string>& corrections, const std::vector<std::string>& shapes);
 

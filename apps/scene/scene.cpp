@@ -110,9 +110,11 @@ void look_up(const Scene& scene, PlaceScene& place) {
   if (scene.hub.fixed && place.body == "hub") place.body.clear();
   const auto body = std::ranges::find(scene.bodies, place.body, &BodyScene::name);
   if (body == scene.bodies.end()) return;
-  if (place.marker.empty() && place.point.isZero(0) && body->is_boom() && body->root_moves()) place.marker = "root";
+  const std::vector<std::string> names = marker_names(*body);
+  const bool at_root = place.marker.empty() && place.point.isZero(0) && body->root_moves();
+  if (at_root && std::ranges::find(names, "root") != names.end()) place.marker = "root";
   if (place.marker.empty()) return;
-  place.marker = spelled(place.marker, marker_names(*body));
+  place.marker = spelled(place.marker, names);
 }
 
 Vector3d unit_direction(const Vector3d& v) {

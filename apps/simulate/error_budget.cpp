@@ -2,6 +2,7 @@
 
 #include "apps/model/bounded_modes.hpp"
 #include "apps/model/prepared_body.hpp"
+#include "apps/model/static_shapes.hpp"
 #include "apps/simulate/flights_ahead.hpp"
 #include "apps/simulate/late_vibrations.hpp"
 #include "fem/base/check.hpp"
@@ -75,6 +76,18 @@ void require_richer(const Scene& scene, Richer richer, std::string_view what) {
     const bool is_exact = richer == &RicherBodies::finer_elements && b.structure == "eq14";
     if (b.reduced && b.reduced->structure != "rigid" && !is_exact && !has(b, richer))
       throw InputError(fmt::format("body {} was reduced before, and its file has no {}", b.name, what));
+  }
+}
+
+/// @throws InputError where a body from a file is loaded where the one with more modes has no static shapes.
+void require_static_shapes(const Scene& scene) {
+  for (const BodyScene& b : scene.bodies) {
+    const std::vector<std::string> markers = loads_without_shapes(scene, b);
+    if (!markers.empty())
+      throw InputError(
+          fmt::format("body {} is loaded at {}, where its file has no static shapes; reduce it again, with "
+                      "--loads-at of four places at most",
+                      b.name, fmt::join(markers, ", ")));
   }
 }
 
@@ -184,6 +197,7 @@ struct Beyond {
 std::optional<Beyond> modes_beyond(const Scene& scene, const Scene& flown, const StillKinds& still,
                                    const ErrorBudget& budget, const RunHooks& hooks) {
   require_richer(scene, &RicherBodies::more_modes, "more modes");
+  require_static_shapes(scene);
   if (!any_elastic(scene)) return {};
   if (scene.from) throw InputError("a saved state knows nothing of modes beyond its own");
   const bool loads = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name);

@@ -111,14 +111,13 @@ Scene with_more_modes(Scene scene, const ModesBeyond& more, const RunHooks& hook
     if (b.structure == "rigid" || !b.is_boom()) continue;
     if (b.basis.name == "clamped") {
       b = with_more_of_each_kind(b, more, scene.bodies_kept_in, hooks);
-      b = with_static_shapes(b, static_shapes_of_loads(scene, b));
-      continue;
+    } else {
+      const int per_plane = b.directions == "all" ? (b.modes + 1) / 2 : b.modes;
+      b.modes = 2 * (per_plane + more.of(per_plane));
+      b.directions = "all";
+      b.shapes.clear();
     }
-    const int per_plane = b.directions == "all" ? (b.modes + 1) / 2 : b.modes;
-    b.modes = 2 * (per_plane + more.of(per_plane));
-    b.directions = "all";
-    b.shapes.clear();
-    if (b.basis.name == "mean-axis") b = with_static_shapes(b, static_shapes_of_loads(scene, b));
+    b = with_static_shapes(b, static_shapes_of_loads(scene, b));
   }
   return scene;
 }

@@ -77,8 +77,7 @@ Scene Planner::with_candidates(const Scene& scene, int candidates, int made, con
     int modes = wanted;
     if (b.basis.name == "clamped") modes = made / share + (scene.error_budget ? for_budget : 0);
     b = with_modes(b, modes, scene.bodies_kept_in, hooks);
-    if (b.basis.name == "clamped" || b.basis.name == "mean-axis")
-      b = with_static_shapes(b, moving_static_shapes(scene, b));
+    b = with_static_shapes(b, moving_static_shapes(scene, b));
     const auto shown = candidates < made ? shown_.end() : shown_.find(b.name);
     if (shown != shown_.end()) b.modes = std::max(b.modes, shown->second.modes);
     if (b.modes <= wanted) continue;

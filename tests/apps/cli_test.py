@@ -1365,9 +1365,9 @@ rest = 1.5
 start_angle = 1.0
 """
 
-    def budget(self, body):
+    def budget(self, body, text=None):
         scene = self.folder / "kept.toml"
-        scene.write_text(self.SCENE % body)
+        scene.write_text((text or self.SCENE) % body)
         result = flexboom("run", scene, "--json", "--out", self.folder / "results")
         self.assert_exit(OK, result)
         return json.loads(result.stdout)["error_budget"]
@@ -1402,6 +1402,37 @@ start_angle = 1.0
         of_file = self.budget(f'file = "{body}"')
         self.assertIsNotNone(of_file["truncation"])
         self.assertIsNone(of_file["discretisation"])
+
+    def test_the_file_tells_the_errors_of_loads_anywhere(self):
+        """As those of the same body in the scene: a hinge at a place between root and tip."""
+        rod = BOOM4.read_text() + "[[attachments]]\nname = \"mid\"\nposition = 0.2\nmass = 0.01\n"
+        scene = self.SCENE + """
+[[bodies]]
+name = "weight"
+mass = 0.05
+inertia = [1e-4, 1e-4, 1e-4]
+centre = [0.05, 0, 0]
+[[joints]]
+name = "arm"
+kind = "hinge"
+a = { body = "boom", marker = "mid" }
+b = { body = "weight" }
+stiffness = 0.5
+start = 0.3
+"""
+        model, body = self.folder / "rod.toml", self.folder / "rod.h5"
+        model.write_text(rod)
+        arguments = ("reduce", model, "-o", body, "--count", "4", "--quiet")
+        self.assert_exit(OK, flexboom(*arguments))
+        of_file = self.budget(f'file = "{body}"', scene)
+        of_model = self.budget(f'file = "{model}"\nmodes = 4\ndirections = "all"\nstiffening = "auto"', scene)
+        self.assertLess(abs(math.log(of_file["truncation"] / of_model["truncation"])), math.log(1.5))
+        self.assert_exit(OK, flexboom(*arguments, "--loads-at", "tip"))
+        of_file = self.budget(f'file = "{body}"', scene)
+        self.assertIsNone(of_file["truncation"], "no static shapes there")
+        self.assert_exit(OK, flexboom(*arguments, "--basis", "mean-axis"))
+        errors = json.loads(flexboom("inspect", body, "--json").stdout)["errors"]
+        self.assertEqual(errors["more_modes"], 4 + 8 + 3 * 6)  # root, middle and tip move
 
     def test_every_export_is_read_back(self):
         clamped = self.reduce("--count", "4", "--damping", "modal:0.01")[0].rename(self.folder / "clamped.h5")

@@ -110,6 +110,37 @@ TEST_P(StaticShapesOfJoints, ShowWhatModesAloneLeaveOut) {
   EXPECT_LT(said.truncation, 1.5 * left_out);
 }
 
+class StaticShapesOfBases : public testing::TestWithParam<std::string> {};
+
+// Modes of no basis hold the slope under a torque where nothing of theirs is.
+TEST_P(StaticShapesOfBases, ShowWhatModesAloneLeaveOut) {
+  const RunResult few = run_scene(bar_with_weight("modes = 6\n" + GetParam(), 1e-3), {});
+  Scene many = bar_with_weight("modes = 30\ncorrections = [\"tip.Fy\", \"tip.Mz\", \"tip.Fx\"]", 1e-8);
+  many.error_budget = false;
+  const RunResult exact = run_scene(many, {});
+  for (const char* name : {"swing.angle", "bar.tip"}) {
+    const double left_out = way_apart(few, exact, name == std::string("bar.tip") ? "bar.tip.y" : name);
+    const auto said = std::ranges::find(few.budget.outputs, name, &OutputErrors::name);
+    ASSERT_NE(said, few.budget.outputs.end());
+    EXPECT_GT(left_out, 1e-3) << name;
+    EXPECT_GT(said->truncation, left_out) << name;
+    EXPECT_LT(said->truncation, 3 * left_out) << name;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Bases, StaticShapesOfBases,
+                         testing::Values("basis = \"hinge\"\nhinge_stiffness = [0.0, 5.0]",
+                                         "basis = \"prestressed\"\nprestress = { spin = [0.0, 0.0, 0.1] }",
+                                         "basis = \"craig-bampton\"\ninterfaces = [\"root\"]"));
+
+// The static shape of a load at an interface is among the coordinates of the interface.
+TEST(StaticShapes, InterfacesHoldThemAlready) {
+  const std::string basis = "modes = 2\nbasis = \"craig-bampton\"\ninterfaces = [\"root\", \"tip\"]";
+  Scene scene = bar_with_weight(basis, 1e-2);
+  EXPECT_TRUE(static_shapes_of_loads(scene, scene.bodies[0]).empty());
+  EXPECT_FALSE(std::isnan(run_scene(scene, {}).budget.truncation));
+}
+
 // The panel that carries another one has them, and then few modes will do.
 TEST(StaticShapes, ArePartOfAPlan) {
   Scene scene = scene_named("wing-satellite");
