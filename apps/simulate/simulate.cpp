@@ -266,11 +266,16 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
   if (r.scene.error_budget && !repeat)
     words.push_back(fmt::format("error budget: not measured, its repeats would cost many times {} evaluations",
                                 run.motion.summary.rhs_evaluations));
+  const auto tell_before_the_repeats = [&] {  // which may take long
+    if (of_run.checkpoint) of_run.checkpoint(run, 0);
+  };
   if (r.scene.error_budget && repeat && !run.motion.summary.interrupted) {
     const Stopwatch start;
+    tell_before_the_repeats();
     r.budget = measure_budget(r.scene, run, hooks, words, planner.still());
     while (planner.improve(r.scene, r.budget, hooks, r.plan)) {
       run = run_once(r.scene, of_run);
+      tell_before_the_repeats();
       words.clear();
       r.budget = measure_budget(r.scene, run, hooks, words, planner.still());
     }

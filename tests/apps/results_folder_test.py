@@ -250,6 +250,19 @@ class Killed(Kills):
     def test_sport(self):
         self.assertGreater(self.check_killed(6, "sport", "--duration", "2", tolerance=1e-7, checkpoint="0"), 0)
 
+    def test_a_run_whose_errors_are_measured_is_whole(self):
+        out = self.folder / "out"
+        process = self.start("run", "sport", "--formulation", "multipliers", "--duration", "0.5", "--tolerance", "1e-3", "--quiet",
+                             "--out", out)
+        while process.poll() is None and self.state_time(out) != 0.5:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGKILL)
+        self.assertEqual(process.wait(), -signal.SIGKILL, "its errors took no time")
+        summary = self.summary(out)
+        self.assertEqual((summary["status"], summary["error_budget"]["total"]), ("running", None))
+        self.assertEqual(cli.columns(out / "trajectory.csv")["t"][-1], 0.5)
+        self.assertTrue(cli.read_csv(out / "events.csv")[1:])
+
     def test_other_methods_and_scenes(self):
         for arguments in (("sport", "--duration", "0.3", "--integrator", "bdf"),
                           ("sport", "--duration", "0.05", "--formulation", "multipliers"),
