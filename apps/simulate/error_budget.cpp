@@ -3,6 +3,7 @@
 #include "apps/model/bounded_modes.hpp"
 #include "apps/model/prepared_body.hpp"
 #include "apps/model/static_shapes.hpp"
+#include "apps/simulate/field_error.hpp"
 #include "apps/simulate/flights_ahead.hpp"
 #include "apps/simulate/late_vibrations.hpp"
 #include "fem/base/check.hpp"
@@ -13,6 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -152,17 +154,15 @@ struct Measuring {
     budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
   }
 
-  /// Enters what a repeat has changed in each output, and `more` of the largest value of each that is no `given`
-  /// function of time. Returns the largest.
-  double enter(Part part, const Finding& finding, double more = 0, const std::vector<std::string>& given = {}) {
+  /// Enters what a repeat has changed in each output, and `more` of it, in its unit. Returns the largest.
+  double enter(Part part, const Finding& finding, const std::function<double(const OutputErrors&)>& more = {}) {
     double most = 0;
     for (OutputErrors& o : budget.outputs) {
       const auto d = std::ranges::find(finding.differences, o.name, &OutputDifference::name);
       const bool is_known = d != finding.differences.end();
       const double error = is_known ? finding.factor * d->error : 0, before = worst_part(o);
       if (is_known) o.scale = std::max(o.scale, d->scale), o.size = std::max(o.size, d->size);
-      const bool is_given = std::ranges::find(given, o.name) != given.end();
-      o.*part = error + (o.scale > 0 && !is_given ? more * o.size / o.scale : 0);
+      o.*part = error + (o.scale > 0 && more ? more(o) / o.scale : 0);
       if (error > before) o.when = d->time;
       most = std::max(most, o.*part);
     }
@@ -284,6 +284,11 @@ void add(std::vector<OutputDifference>& sum, const std::vector<OutputDifference>
   }
 }
 
+bool is_asked_for(const Scene& scene, const std::string& output) {
+  return std::ranges::any_of(scene.outputs,
+                             [&](const std::string& text) { return wanted_output(text).name == output; });
+}
+
 /// What geometric stiffness changes where it is left out, and what then is left out still: the square of the
 /// deflection, and vibrations whose frequency depends on it. Where it changes too much and the scene leaves it open,
 /// the scene has it from then on, and a run with it takes the place of `run`.
@@ -312,7 +317,17 @@ double linearisation_error(Scene& scene, Scene& flown, Run& run, Measuring& m) {
   add(differences, m.repeats.difference(run.outputs, with_late_vibrations(run, flown), flown));
   double deflection = 0;
   for (const Bending& b : run.bending) deflection = std::max(deflection, b.of_length);
-  return m.enter(&OutputErrors::linearisation, {differences}, deflection * deflection, prescribed_outputs(scene));
+  const std::vector<std::string> given = prescribed_outputs(scene);
+  const FieldError field = field_error(scene, run.bodies);
+  const auto left_out = [&](const OutputErrors& o) {
+    if (std::ranges::find(given, o.name) != given.end()) return 0.0;
+    const double drift = !is_asked_for(scene, o.name)    ? 0
+                         : o.name.ends_with(".position") ? field.position
+                         : o.name.ends_with(".velocity") ? field.velocity
+                                                         : 0;
+    return (deflection * deflection + field.share) * o.size + drift;
+  };
+  return m.enter(&OutputErrors::linearisation, {differences}, left_out);
 }
 
 }  // namespace

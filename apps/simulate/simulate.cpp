@@ -2,6 +2,7 @@
 
 #include "apps/base/deflection.hpp"
 #include "apps/simulate/error_budget.hpp"
+#include "apps/simulate/field_error.hpp"
 #include "apps/simulate/flights_ahead.hpp"
 #include "apps/simulate/multipliers_flight.hpp"
 #include "apps/simulate/planner.hpp"
@@ -139,6 +140,11 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
   plan.emplace_back(scene.formulation == "multipliers" ? "formulation: redundant coordinates, joints by multipliers"
                                                        : "formulation: relative coordinates");
   describe_model(scene, run, plan);
+  if (const FieldError field = field_error(scene, run.bodies); field.share > 0)
+    plan.push_back(
+        fmt::format("orbit: gravity is linear within a body: outputs change by {:.0e} with its next term, and "
+                    "the system drifts by {:.0e} m in {:g} s, which counts where its position is asked for",
+                    field.share, field.position, scene.duration));
   if (scene.orbit)
     plan.push_back(fmt::format("orbit: rate {:.6e} rad/s{}; differential gravity {}, {:.1e} 1/s^2", scene.orbit->rate(),
                                scene.orbit->J2 ? ", with J2" : "",

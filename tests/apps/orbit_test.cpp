@@ -77,5 +77,51 @@ TEST(Orbit, SmallAnglesAgainstTheFrameKeepTheirTolerance) {
   EXPECT_LT(compare_outputs(r.outputs, exact, scene.outputs).at(0).error, 2 * r.budget.time);
 }
 
+/// A body of a hundred metres, whole or of two that are fixed to each other.
+Scene long_body_in_orbit(bool split) {
+  const char* const whole = R"(mass = 1000.0
+inertia = [4e6, 6e6, 3e6]
+)";
+  const char* const parts = R"(mass = 700.0
+centre = [-19.285714285714285, 0.0, 0.0]
+inertia = [3.5e6, 4532142.857142857, 1582142.8571428573]
+[[bodies]]
+name = "part"
+mass = 300.0
+inertia = [5e5, 6e5, 5.5e5]
+[[joints]]
+name = "weld"
+kind = "fixed"
+a = { body = "hub", point = [45.0, 0.0, 0.0] }
+b = { body = "part" }
+)";
+  return parse_scene(std::string(R"(format = "flexboom-scene-1"
+name = "long"
+duration = 6000.0
+output_step = 20.0
+accuracy = { tolerance = 1e-6, outputs = ["hub.rotation", "lvlh.pitch", "hub.position"] }
+orbit = { altitude = 5e5, inclination = 1.2, gravity = "differential" }
+[[joints]]
+kind = "free"
+b = { body = "hub" }
+start_omega = [0.0003, -0.0011, 0.0002]
+[[bodies]]
+name = "hub"
+)") + (split ? parts : whole),
+                     "long");
+}
+
+// Gravity is linear within a body, so a body of two parts knows more of it. The budget has the difference.
+TEST(Orbit, WhatGravityWithinABodyLeavesOutIsInTheBudget) {
+  const RunResult whole = run_scene(long_body_in_orbit(false), {}), parts = run_scene(long_body_in_orbit(true), {});
+  EXPECT_FALSE(whole.budget.within(1e-6));
+  for (const OutputDifference& d : compare_outputs(whole.outputs, parts.outputs, whole.scene.outputs)) {
+    const auto said = std::ranges::find(whole.budget.outputs, d.name, &OutputErrors::name);
+    ASSERT_NE(said, whole.budget.outputs.end());
+    EXPECT_GT(d.error * d.scale, 1e-6 * d.size) << d.name;
+    EXPECT_GT(said->linearisation * said->scale, 0.8 * d.error * d.scale) << d.name;
+  }
+}
+
 }  // namespace
 }  // namespace flexboom
