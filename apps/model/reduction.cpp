@@ -103,7 +103,8 @@ BasisOptions basis_options(const ReduceArguments& a, const Model& model) {
   if (!a.hinge_axis.empty()) o.hinge_axis = vector_of(a.hinge_axis);
   if (!a.spin.empty() || !a.acceleration.empty() || !a.turns.empty()) o.motion = steady_motion(a, o.motion);
   const bool all = model.body && model.body->directions == "all";
-  o.in_plane = o.name == "hinge" && !all;
+  const bool is_asked_for_plane = model.body && model.body->directions_given;  // else all count, but those of a hinge
+  o.in_plane = !all && (o.name == "hinge" || is_asked_for_plane);
   o.modes = a.count.value_or(o.name == "hinge" ? 1 : model.modes.value_or(10));
   o.backend = a.backend.value_or(model.backend.value_or("auto"));
   return o;

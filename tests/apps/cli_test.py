@@ -1290,6 +1290,17 @@ class Reduce(Case):
                 kinds = [c["kind"] for c in document["coordinates"]]
                 self.assertEqual((kinds.count("bending_y"), len(kinds)), (2 * count, 2 * count + beside), kinds)
 
+    def test_directions_of_the_body_hold_for_every_basis(self):
+        plane = self.folder / "plane.toml"
+        plane.write_text(BOOM4.read_text().replace('directions = "all"', 'directions = "hinge-plane"', 1))
+        interfaces = ("craig-bampton", "--interface", "root", "--interface", "tip", "--reference", "root")
+        for basis in (("clamped",), ("mean-axis",), interfaces, ("prestressed", "--spin", "0,0,1")):
+            result = flexboom("reduce", plane, "-o", self.folder / "body.h5", "--json", "--count", "4", "--basis", *basis)
+            self.assert_exit(OK, result)
+            kinds = [c["kind"] for c in json.loads(result.stdout)["coordinates"]]
+            self.assertEqual(set(kinds) - {"interface"}, {"bending_y"}, basis)
+            self.assertEqual(kinds.count("interface"), 2 if basis == interfaces else 0)
+
     def test_names_of_node_sets_compare_without_case(self):
         """Decks write them in capitals."""
         for arguments in (("--loads-at", "tip"), ("--attach", "tip.Fy"), ("--select", "output:tip.uy,0.9"),
