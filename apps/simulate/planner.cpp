@@ -36,6 +36,7 @@ constexpr int for_budget = 8;        // modes beside the candidates that show th
 constexpr int most_trials = 6;       // runs with fewer modes
 constexpr int most_rounds = 5;       // improvements
 constexpr double not_near = 10;      // times the tolerance: more modes that hardly help do not get there
+constexpr double first_near = 100;   // the same, where more have not been looked at
 constexpr int most_doublings = 2;    // of the candidates, before a budget shows what they leave out
 constexpr double nearly_all = 0.85;  // of the candidates: where so many are needed, more would be, too
 
@@ -205,7 +206,7 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
 bool Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
   if (open_.empty()) return false;
   Scene given = scene;
-  bool has_chosen = false;
+  bool has_chosen = false, was_far = false;
   std::vector<std::string> words;
   // The budget shows what the candidates leave out, unless that is clear before. Without it they are enough where fewer
   // of them are.
@@ -218,7 +219,11 @@ bool Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::strin
     scene = std::move(other), has_chosen = true;
     given.integrator_tolerance = scene.integrator_tolerance;
     const bool is_enough = choice->needed < (given.error_budget ? nearly_all : 1);
-    hopeless_ = given.error_budget && !is_enough && step > 0 && choice->error_of_fewer > not_near * scene.tolerance;
+    const double error = choice->error_of_fewer / scene.tolerance, allowed = step == 0 ? first_near
+                                                                             : was_far ? 1
+                                                                                       : not_near;
+    hopeless_ = given.error_budget && !is_enough && error > allowed;
+    was_far = error > not_near;  // a second look must show that more of them help
     if (is_enough || hooks.stopped()) return true;
     if (step == most_doublings || costly_ || hopeless_ || 2 * candidates_ > most_candidates) break;
     candidates_ *= 2;
