@@ -28,17 +28,14 @@ ReducedBody for_comparison(Model model, const ReductionOptions& o, int threads) 
 std::vector<std::string> static_shapes_of_markers(const Model& model, const ReductionOptions& o,
                                                   const ReducedBody& kept) {
   constexpr size_t few = 4;
-  std::vector<std::string> places, shapes;
+  std::vector<std::string> places;
   const auto is_wanted = [&](const std::string& name) {
     return o.loads_at.empty() ||
            std::ranges::any_of(o.loads_at, [&](const std::string& set) { return same_but_case(set, name); });
   };
   for (const Marker& m : kept.markers)
     if (model.mesh.node_sets.contains(m.name) && can_load(kept, m.name) && is_wanted(m.name)) places.push_back(m.name);
-  if (places.size() > few) return {};
-  for (const std::string& place : places)
-    for (std::string& shape : static_shapes_at(place)) shapes.push_back(std::move(shape));
-  return shapes;
+  return places.size() > few ? std::vector<std::string>{} : static_shapes_at(places);
 }
 
 /// With as many more modes as the elements have, eight at most; with those of all directions beside a plane's, where

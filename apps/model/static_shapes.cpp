@@ -23,6 +23,13 @@ std::vector<std::string> static_shapes_at(const std::string& node_set) {
   return shapes;
 }
 
+std::vector<std::string> static_shapes_at(const std::vector<std::string>& node_sets) {
+  std::vector<std::string> shapes;
+  for (const std::string& set : node_sets)
+    for (std::string& shape : static_shapes_at(set)) shapes.push_back(std::move(shape));
+  return shapes;
+}
+
 namespace {
 
 /// Has a place coordinates of its own, which hold the static shapes of its loads?
@@ -49,13 +56,12 @@ std::vector<std::string> loaded_markers(const Scene& scene, const std::string& b
 }  // namespace
 
 std::vector<std::string> static_shapes_of_loads(const Scene& scene, const BodyScene& body) {
-  std::vector<std::string> shapes;
-  for (const std::string& marker : loaded_markers(scene, body.name)) {
+  std::vector<std::string> markers = loaded_markers(scene, body.name);
+  std::erase_if(markers, [&](const std::string& marker) {
     const bool is_held = marker == body.clamp && body.basis.name != "mean-axis";
-    if (is_held || is_interface(body, marker)) continue;
-    for (std::string& shape : static_shapes_at(marker)) shapes.push_back(std::move(shape));
-  }
-  return shapes;
+    return is_held || is_interface(body, marker);
+  });
+  return static_shapes_at(markers);
 }
 
 bool can_load(const ReducedBody& body, const std::string& name) {

@@ -12,8 +12,9 @@ namespace flexboom {
 /// slender boom are beyond many that bend. `clamped`: the node set that is held.
 std::vector<std::string> static_shapes_beside(const ReducedBody& body, const std::string& clamped);
 
-/// Corrections of all six loads at a node set.
+/// Corrections of all six loads at a node set, or at each of several.
 std::vector<std::string> static_shapes_at(const std::string& node_set);
+std::vector<std::string> static_shapes_at(const std::vector<std::string>& node_sets);
 
 /// Those of every node set of a boom where joints, springs and loads of the scene act, but the one that is held. The
 /// slope that a torque gives a boom there converges as 1 / n with the number of its clamped modes; with its static

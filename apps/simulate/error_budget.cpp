@@ -7,6 +7,7 @@
 #include "apps/simulate/flights_ahead.hpp"
 #include "apps/simulate/late_vibrations.hpp"
 #include "fem/base/check.hpp"
+#include "reduction/exports/integrals.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -336,9 +337,7 @@ namespace {
 
 /// About the mass centre.
 double least_inertia(const ReducedBody& body) {
-  const Eigen::Vector3d c = body.mc0 / body.m;
-  const Eigen::Matrix3d about_centre =
-      body.J0 - body.m * (c.squaredNorm() * Eigen::Matrix3d::Identity() - c * c.transpose());
+  const Eigen::Matrix3d about_centre = body.J0 - centre_inertia(body.m, body.mc0);
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(about_centre, Eigen::EigenvaluesOnly).eigenvalues()[0];
 }
 

@@ -1,6 +1,7 @@
 #include "apps/simulate/field_error.hpp"
 
 #include "dynamics/environment/gravity_field.hpp"
+#include "reduction/exports/integrals.hpp"
 
 #include <Eigen/Eigenvalues>
 
@@ -16,9 +17,7 @@ FieldError field_error(const Scene& scene, const std::vector<PreparedBody>& bodi
   const double r = planet.radius + scene.orbit->altitude, n = std::sqrt(planet.mu / (r * r * r));
   double mass = 0, unequal = 0, size = 0;
   for (const PreparedBody& p : bodies) {
-    const Eigen::Vector3d c = p.body.mc0 / p.body.m;
-    const Eigen::Matrix3d J =
-        p.body.J0 - p.body.m * (c.squaredNorm() * Eigen::Matrix3d::Identity() - c * c.transpose());
+    const Eigen::Matrix3d J = p.body.J0 - centre_inertia(p.body.m, p.body.mc0);
     const Eigen::Vector3d principal =
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(J, Eigen::EigenvaluesOnly).eigenvalues();
     mass += p.body.m;

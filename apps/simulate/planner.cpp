@@ -219,9 +219,8 @@ bool Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::strin
     scene = std::move(other), has_chosen = true;
     given.integrator_tolerance = scene.integrator_tolerance;
     const bool is_enough = choice->needed < (given.error_budget ? nearly_all : 1);
-    const double error = choice->error_of_fewer / scene.tolerance, allowed = step == 0 ? first_near
-                                                                             : was_far ? 1
-                                                                                       : not_near;
+    const double error = choice->error_of_fewer / scene.tolerance;
+    const double after_a_look = was_far ? 1 : not_near, allowed = step == 0 ? first_near : after_a_look;
     hopeless_ = given.error_budget && !is_enough && error > allowed;
     was_far = error > not_near;  // a second look must show that more of them help
     if (is_enough || hooks.stopped()) return true;

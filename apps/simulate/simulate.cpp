@@ -180,8 +180,7 @@ std::string help_with_truncation(const RunResult& r) {
                        fmt::join(names, ", "), names.size() == 1 ? "has" : "have");
   if (!is_load(worst->name) || !(worst->truncation > of_fronts)) return "";
   return "; where a load or a motion sets in at once, loads of joints follow within the time of a wave through the "
-         "body, "
-         "and no number of modes resolves that: let it rise over some periods of the body, or name other outputs";
+         "body, and no number of modes resolves that: let it rise over some periods of the body, or name other outputs";
 }
 
 /// What a user must not overlook.
