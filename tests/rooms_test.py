@@ -41,7 +41,7 @@ ROOMS = {
         "model": ["numerics", "environment"],
         "events": ["model"],
         "relative": ["numerics", "environment", "model", "events"],
-        "redundant": ["numerics", "model", "events", "relative"],
+        "redundant": ["numerics", "model", "events"],
         "methods": ["numerics", "events", "relative"],
         "simulation": ["numerics", "model", "events", "relative", "redundant", "methods"],
     },

@@ -11,7 +11,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <memory>
 #include <numbers>
 #include <utility>
@@ -101,16 +100,6 @@ void add_states(const Multipliers& system, const MultibodyTrajectory& flight, st
   }
 }
 
-/// Energies as the tree has them: the potential of gravity apart, mechanisms of loops among the elastic ones.
-Balance balance_of(const Tree& tree, const MultibodyTrajectory& flight, size_t row, const VectorXd& y) {
-  Balance b;
-  b.kinetic = flight.balance[row].kinetic;
-  b.potential = tree.balance(flight.time[row], y).potential;
-  b.elastic = flight.balance[row].elastic - b.potential;
-  b.dissipated = flight.states[row].dissipated, b.work = flight.states[row].work;
-  return b;
-}
-
 /// At every output of a short list, at some of a long one.
 std::vector<LargestStiffening> largest_stiffening(const Multipliers& system, const MultibodyTrajectory& flight) {
   std::vector<LargestStiffening> largest(system.multibody().bodies.size());
@@ -181,16 +170,15 @@ void set_flown(const FlownByMultipliers& f, size_t first, size_t last, const std
   for (size_t row = first; row < last; ++row) {
     r.motion.time.push_back(f.flight.time[row]);
     r.motion.y.push_back(f.y(row));
-    r.motion.balance.push_back(balance_of(f.tree, f.flight, row, r.motion.y.back()));
+    r.motion.balance.push_back(f.flight.balance[row]);
   }
   r.outputs = output_table(f.scene, f.tree, last - first, [&](size_t i, Moment& now) {
     const size_t row = first + i;
     now = {f.flight.time[row], f.states[row], joint_loads(f.system, f.flight.states[row]), r.motion.balance[i]};
   });
   r.motion.warnings = warnings_of(f.scene, f.system.multibody(), f.flight, r.motion.stiffening_effect, stiffening);
-  const MultibodyState& last_state = f.flight.states.back();
-  const Balance at_end = balance_of(f.tree, f.flight, f.states.size() - 1, f.y(f.states.size() - 1));
-  r.ledger = EnergyOfRun{at_end.kinetic, at_end.potential, at_end.work, last_state.ledger};
+  const Balance& at_end = f.flight.balance.back();
+  r.ledger = EnergyOfRun{at_end.kinetic, at_end.potential, at_end.work, at_end.ledger};
   r.motion.events = f.flight.events;
   r.motion.summary = summary_of(f.flight.summary);
   r.end = end_of(r, f.scene, f.flight.time.back(), f.y(f.states.size() - 1), r.motion.summary);

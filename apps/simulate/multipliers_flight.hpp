@@ -7,7 +7,7 @@
 /// Scenes flown in redundant coordinates, formulation = "multipliers".
 namespace flexboom {
 
-/// As fly_tree, loops included; geometric stiffness is left out, and its effect measured. The start values of the
+/// As fly_tree, loops included. The start values of the
 /// joints say where the bodies are; then they move as little as needed until the loops close.
 /// @throws InputError naming a joint that cannot be closed; NumericalError naming one that locks.
 Run fly_by_multipliers(const Scene&, std::vector<PreparedBody>, const RunHooks&, long max_steps);

@@ -8,7 +8,6 @@
 #include <nvector/nvector_serial.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
-#include <cmath>
 #include <utility>
 
 namespace flexboom {
@@ -31,6 +30,7 @@ class Encke {
     for (sundials::Vector* vector : {&y_, &scale_, &term_}) vector->reset(N_VNew_Serial(6, context_.context));
     solver_.reset(SUNNonlinSol_FixedPoint(y_.get(), 0, context_.context));
     cvode_.reset(CVodeCreate(CV_ADAMS, context_.context));
+    if (!y_ || !scale_ || !term_ || !solver_ || !cvode_) throw NumericalError("SUNDIALS: out of memory");
     difference(y_.get()).setZero();
     difference(scale_.get()).head<3>().setConstant(tolerance * start.position.norm());
     difference(scale_.get()).tail<3>().setConstant(tolerance * start.velocity.norm());
@@ -92,13 +92,10 @@ class Encke {
   const Planet& planet_;
   double duration_;
   EnckePath path_;
-  struct FreeCvode {
-    void operator()(void* cvode) const { CVodeFree(&cvode); }
-  };
   sundials::Context context_;
   sundials::Vector y_, scale_, term_;
   sundials::NonlinearSolver solver_;
-  std::unique_ptr<void, FreeCvode> cvode_;
+  sundials::Memory<CVodeFree> cvode_;
 };
 
 }  // namespace

@@ -22,8 +22,8 @@ LocalGravity OrbitalField::at(double t, const Vector3d& rho) const {
 // With u = u0 + S q and the second moment sum dm u u^T = tr(J)/2 I - J, and tr G = 0:
 // force m a + G mc; torque mc x a + axial(G J); modal Ct^T a - 1/2 G : dJ/dq_k.
 BodyGravity body_gravity(const ReducedBody& b, const LocalGravity& field, const Eigen::VectorXd& q) {
-  require(q.size() == b.n(),
-          fmt::format("body {}: {} elastic coordinates are given, it has {}", b.name, q.size(), b.n()));
+  if (q.size() != b.n())
+    throw InputError(fmt::format("body {}: {} elastic coordinates are given, it has {}", b.name, q.size(), b.n()));
   const DeformedInertia d = deformed_inertia(b, q);
   const Matrix3d& G = field.gradient;
   const Matrix3d GJ = G * d.J;

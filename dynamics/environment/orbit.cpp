@@ -110,8 +110,9 @@ OrbitState Orbit::at(double t) const {
   if (path_->steps.empty()) {
     s = kepler(planet_.mu, path_->start, t);
   } else {
-    require(t >= 0 && t <= path_->duration,
-            fmt::format("orbit: it was integrated from 0 to {:g} s, and {:.17g} s was asked for", path_->duration, t));
+    if (!(t >= 0 && t <= path_->duration))
+      throw InputError(
+          fmt::format("orbit: it was integrated from 0 to {:g} s, and {:.17g} s was asked for", path_->duration, t));
     const EnckeStep& step = *std::ranges::lower_bound(path_->steps, t, {}, &EnckeStep::end);
     const EnckeArc& arc = path_->arcs[static_cast<size_t>(step.arc)];
     Eigen::Matrix<double, 6, 1> d = step.c.col(step.c.cols() - 1);

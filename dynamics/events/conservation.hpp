@@ -1,14 +1,17 @@
 #pragma once
 
 #include "dynamics/events/flight.hpp"
+#include "dynamics/model/energy_ledger.hpp"
 #include "dynamics/model/multibody.hpp"
 
 #include <Eigen/Core>
 
-#include <algorithm>
-#include <cmath>
-
 namespace flexboom {
+
+/// Bodies that turn by a hundredth of a radian per second have this energy [J]; `inertia`: traces about their origins.
+double slow_energy(double inertia);
+/// The share of it that is round-off: nothing moves.
+inline constexpr double nothing = 1e-20;
 
 /// Does something join bodies to the inertial frame?
 bool is_held(const Multibody&);
@@ -22,19 +25,8 @@ class Conservation {
   /// `before`: of a flight that this one goes on.
   Conservation(const std::vector<ReducedBody>&, const MotionScales& before);
 
-  /// The next moment: `total` is kept, `size` its largest part [J]. A balance has momenta and their scales.
-  template <class AnyBalance>
-  void add(double total, double size, const AnyBalance& b) {
-    if (!begun_) first_total_ = total, P_ = b.momentum, H_ = b.angular_momentum;
-    begun_ = true;
-    gap_ = std::max(gap_, std::abs(total - first_total_));
-    dP_ = std::max(dP_, (b.momentum - P_).norm());
-    dH_ = std::max(dH_, (b.angular_momentum - H_).norm());
-    largest_.energy = std::max(largest_.energy, size);
-    largest_.shaking = std::max(largest_.shaking, b.shaking());
-    largest_.momentum = std::max(largest_.momentum, b.momentum_scale);
-    largest_.angular_momentum = std::max(largest_.angular_momentum, b.angular_momentum_scale);
-  }
+  /// The next moment.
+  void add(const Balance&);
 
   const MotionScales& largest() const { return largest_; }
   double energy_balance() const;  // largest change of the total by the largest energy

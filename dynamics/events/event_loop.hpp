@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <iterator>
 #include <optional>
 #include <span>
@@ -29,10 +30,10 @@ class Flight : protected StopMotion, protected LawMotion {
         laws_(std::move(laws)),
         outputs_(options),
         t_(options.start),
-        so_far_(so_far),
-        clock_(options) {}
+        so_far_(so_far) {}
 
-  /// @throws NumericalError when the method fails; what was flown until then was told to the checkpoint.
+  /// @throws NumericalError when the method fails, InputError where a function of time has no value; what was flown
+  /// until then was told to the checkpoint.
   Result fly() {
     record(t_, y_);
     checkpoint();
@@ -40,10 +41,13 @@ class Flight : protected StopMotion, protected LawMotion {
       restart();
       while (t_ < options_.duration && !stopped()) {
         advance();
-        if (clock_.due() && t_ < options_.duration) checkpoint();
+        if (since_checkpoint_.seconds() >= options_.checkpoint_every && t_ < options_.duration) checkpoint();
       }
-    } catch (const NumericalError&) {
-      checkpoint();
+    } catch (const std::exception&) {
+      try {
+        checkpoint();
+      } catch (const std::exception&) {  // the first failure is the one to tell
+      }
       throw;
     }
     close();
@@ -178,11 +182,11 @@ class Flight : protected StopMotion, protected LawMotion {
       result_.time.resize(rows);
       keep_rows(rows);
     }
-    clock_.restart();
+    since_checkpoint_ = Stopwatch();
   }
 
   const Checkpoint<Result>& so_far_;
-  CheckpointClock clock_;
+  Stopwatch since_checkpoint_;
   Stopwatch watch_;
   Eigen::VectorXd next_y_;
   std::vector<double> times_;  // of outputs within a step, and their states

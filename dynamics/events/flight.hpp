@@ -72,18 +72,6 @@ struct FlightOptions {
 template <class Trajectory>
 using Checkpoint = std::function<void(const Trajectory& so_far, std::size_t outputs)>;
 
-/// When the next checkpoint is due. None changes a flight: they come by the clock.
-class CheckpointClock {
- public:
-  explicit CheckpointClock(const FlightOptions& o) : every_(o.checkpoint_every) {}
-  bool due() const { return since_.seconds() >= every_; }
-  void restart() { since_ = Stopwatch(); }
-
- private:
-  double every_;
-  Stopwatch since_;
-};
-
 /// How fast a hinge or joint was since it last crossed its stop. Bounces lose a part of that each. A motion that only
 /// decays loses all of it: what it crosses the stop with is round-off or the method's error, and no contact.
 class Approach {

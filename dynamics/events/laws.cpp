@@ -171,8 +171,7 @@ void Laws::begin(LawMotion& motion, double t, std::vector<StopEvent>& events) {
   for (std::size_t i = 0; i < laws_.size(); ++i) {
     Law& law = laws_[i];
     const Gap way = motion.joint_way(law.joint);
-    const bool goes_on = law.state.beyond.size() == law.model.ramps.size() &&
-                         law.state.faster.size() == law.model.rate_ramps.size() && law.largest_rate > 0;
+    const bool goes_on = law.model.fits(law.state) && law.largest_rate > 0;
     law.largest_rate = std::max(law.largest_rate, std::abs(way.rate));
     law.largest_gap = std::max(law.largest_gap, std::abs(way.value));
     if (goes_on) continue;

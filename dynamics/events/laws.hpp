@@ -12,24 +12,24 @@ class LawMotion {
  public:
   virtual ~LawMotion() = default;
   /// Angle less the threshold of the mechanism, and its rate.
-  virtual Gap joint_way(std::size_t) { return {}; }
-  virtual double joint_acceleration(std::size_t) { return 0; }
+  virtual Gap joint_way(std::size_t joint) = 0;
+  virtual double joint_acceleration(std::size_t joint) = 0;
   /// What holds a joint that is held pushes b with.
-  virtual double hold_load(std::size_t) { return 0; }
+  virtual double hold_load(std::size_t joint) = 0;
   /// Branches have changed.
   virtual void take_branches() {}
 
   /// Finds what a sudden load does to the motion: changes of rates, and what joints that are held get, per impulse.
-  virtual void prepare_blow(std::size_t /*joint*/) {}
-  virtual double rate_of_blow(std::size_t /*joint*/) { return 0; }
-  virtual double hold_of_blow(std::size_t /*joint*/) { return 0; }
-  virtual void strike(double /*impulse*/) {}
+  virtual void prepare_blow(std::size_t joint) = 0;
+  virtual double rate_of_blow(std::size_t joint) = 0;
+  virtual double hold_of_blow(std::size_t joint) = 0;
+  virtual void strike(double impulse) = 0;
 
   /// Angle exactly there, where it is one number of the state.
   virtual void put(std::size_t /*joint*/, double /*x*/) {}
   /// At rest but for round-off: exactly so.
   virtual void put_to_rest(std::size_t /*joint*/) {}
-  virtual void lose(std::size_t /*joint*/, LawLoss, double /*energy*/) {}
+  virtual void lose(std::size_t joint, LawLoss, double energy) = 0;
 };
 
 /// A quantity whose change of sign is an event of a law.

@@ -30,62 +30,59 @@ class Arkode {
     N_VConst(0.0, y_.get());
     const bool implicit = tables.implicit_one != ARKODE_DIRK_NONE;
     const ARKRhsFn f = &sundials::Problem::derivative;
-    arkode_ = ARKStepCreate(implicit ? nullptr : f, implicit ? f : nullptr, 0.0, y_.get(), context_.context);
-    if (arkode_ == nullptr) throw NumericalError("SUNDIALS: out of memory");
-    check(ARKStepSetErrHandlerFn(arkode_, sundials::quiet, nullptr), "ARKStepSetErrHandlerFn");
-    check(ARKStepSetUserData(arkode_, &problem_), "ARKStepSetUserData");
-    check(ARKStepWFtolerances(arkode_, &sundials::Problem::weights), "ARKStepWFtolerances");
-    check(ARKStepSetTableNum(arkode_, tables.implicit_one, tables.explicit_one), "ARKStepSetTableNum");
-    check(ARKStepSetMaxNumSteps(arkode_, -1), "ARKStepSetMaxNumSteps");
+    arkode_.reset(ARKStepCreate(implicit ? nullptr : f, implicit ? f : nullptr, 0.0, y_.get(), context_.context));
+    if (!arkode_) throw NumericalError("SUNDIALS: out of memory");
+    check(ARKStepSetErrHandlerFn(arkode_.get(), sundials::quiet, nullptr), "ARKStepSetErrHandlerFn");
+    check(ARKStepSetUserData(arkode_.get(), &problem_), "ARKStepSetUserData");
+    check(ARKStepWFtolerances(arkode_.get(), &sundials::Problem::weights), "ARKStepWFtolerances");
+    check(ARKStepSetTableNum(arkode_.get(), tables.implicit_one, tables.explicit_one), "ARKStepSetTableNum");
+    check(ARKStepSetMaxNumSteps(arkode_.get(), -1), "ARKStepSetMaxNumSteps");
     // After a stop the step that was right before it may be far too long.
-    check(ARKStepSetMaxErrTestFails(arkode_, 40), "ARKStepSetMaxErrTestFails");
-    check(ARKStepSetMaxConvFails(arkode_, 40), "ARKStepSetMaxConvFails");
+    check(ARKStepSetMaxErrTestFails(arkode_.get(), 40), "ARKStepSetMaxErrTestFails");
+    check(ARKStepSetMaxConvFails(arkode_.get(), 40), "ARKStepSetMaxConvFails");
     // What is between two steps comes from shorter steps: the polynomials of ARKODE have less digits.
-    check(ARKStepSetInterpolantType(arkode_, ARK_INTERP_LAGRANGE), "ARKStepSetInterpolantType");
+    check(ARKStepSetInterpolantType(arkode_.get(), ARK_INTERP_LAGRANGE), "ARKStepSetInterpolantType");
     if (!implicit) return;
-    check(ARKStepSetLinearSolver(arkode_, problem_.solver(), problem_.matrix()), "ARKStepSetLinearSolver");
-    check(ARKStepSetLinSysFn(arkode_, &Arkode::linear_system), "ARKStepSetLinSysFn");
-    check(ARKStepSetDeduceImplicitRhs(arkode_, SUNTRUE), "ARKStepSetDeduceImplicitRhs");
+    check(ARKStepSetLinearSolver(arkode_.get(), problem_.solver(), problem_.matrix()), "ARKStepSetLinearSolver");
+    check(ARKStepSetLinSysFn(arkode_.get(), &Arkode::linear_system), "ARKStepSetLinSysFn");
+    check(ARKStepSetDeduceImplicitRhs(arkode_.get(), SUNTRUE), "ARKStepSetDeduceImplicitRhs");
     // Newton stops when a correction is below a tenth of the error allowed per step. ARKODE's own test takes the rate
     // of convergence of earlier stages for that of this one, and a matrix of another step length: 20 % wrong without a
     // word.
-    check(ARKStepSetNonlinCRDown(arkode_, 1.0), "ARKStepSetNonlinCRDown");
-    check(ARKStepSetDeltaGammaMax(arkode_, 1e-12), "ARKStepSetDeltaGammaMax");
+    check(ARKStepSetNonlinCRDown(arkode_.get(), 1.0), "ARKStepSetNonlinCRDown");
+    check(ARKStepSetDeltaGammaMax(arkode_.get(), 1e-12), "ARKStepSetDeltaGammaMax");
   }
-  ~Arkode() { ARKStepFree(&arkode_); }
-  Arkode(const Arkode&) = delete;
-  Arkode& operator=(const Arkode&) = delete;
 
   sundials::Problem& problem() { return problem_; }
 
   void restart(double t, const double* y) {
     std::copy_n(y, problem_.size(), N_VGetArrayPointer(y_.get()));
-    check(ARKStepReset(arkode_, t, y_.get()), "ARKStepReset");
+    check(ARKStepReset(arkode_.get(), t, y_.get()), "ARKStepReset");
   }
 
   /// One step, to t_end at most. Returns where it ends.
   double step(double t_end) {
-    check(ARKStepSetStopTime(arkode_, t_end), "ARKStepSetStopTime");
+    check(ARKStepSetStopTime(arkode_.get(), t_end), "ARKStepSetStopTime");
     realtype start = 0, reached = t_end;
-    check(ARKStepGetCurrentTime(arkode_, &start), "ARKStepGetCurrentTime");
-    const int flag = ARKStepEvolve(arkode_, t_end, y_.get(), &reached, ARK_ONE_STEP);
+    check(ARKStepGetCurrentTime(arkode_.get(), &start), "ARKStepGetCurrentTime");
+    const int flag = ARKStepEvolve(arkode_.get(), t_end, y_.get(), &reached, ARK_ONE_STEP);
     problem_.rethrow(flag, start, reached);
     check(flag, "ARKStepEvolve");
     return reached;
   }
 
   /// Steps of this length from here on.
-  void set_step(double length) { check(ARKStepSetFixedStep(arkode_, length), "ARKStepSetFixedStep"); }
+  void set_step(double length) { check(ARKStepSetFixedStep(arkode_.get(), length), "ARKStepSetFixedStep"); }
 
   const double* y() const { return N_VGetArrayPointer(y_.get()); }
 
   StepCounts counts() const {
     long steps = 0, explicit_rhs = 0, implicit_rhs = 0, setups = 0, failures = 0, newton = 0;
-    ARKStepGetNumSteps(arkode_, &steps);
-    ARKStepGetNumRhsEvals(arkode_, &explicit_rhs, &implicit_rhs);
-    ARKStepGetNumErrTestFails(arkode_, &failures);
-    ARKStepGetNumLinSolvSetups(arkode_, &setups);
-    ARKStepGetNumNonlinSolvIters(arkode_, &newton);
+    ARKStepGetNumSteps(arkode_.get(), &steps);
+    ARKStepGetNumRhsEvals(arkode_.get(), &explicit_rhs, &implicit_rhs);
+    ARKStepGetNumErrTestFails(arkode_.get(), &failures);
+    ARKStepGetNumLinSolvSetups(arkode_.get(), &setups);
+    ARKStepGetNumNonlinSolvIters(arkode_.get(), &newton);
     return {steps, explicit_rhs + implicit_rhs, problem_.jacobians(), setups, newton, failures};
   }
 
@@ -93,8 +90,8 @@ class Arkode {
   void check(int flag, const char* function) const {
     if (flag >= 0) return;
     realtype t = 0, h = 0;
-    ARKStepGetCurrentTime(arkode_, &t);
-    ARKStepGetLastStep(arkode_, &h);
+    ARKStepGetCurrentTime(arkode_.get(), &t);
+    ARKStepGetLastStep(arkode_.get(), &h);
     sundials::fail("ARKODE", function, ARKStepGetReturnFlagName(flag), t, h);
   }
 
@@ -107,7 +104,7 @@ class Arkode {
   sundials::Context context_;
   sundials::Problem problem_;
   sundials::Vector y_;
-  void* arkode_ = nullptr;
+  sundials::Memory<ARKStepFree> arkode_;
 };
 
 class ArkodeStepper final : public Stepper {
@@ -137,7 +134,10 @@ class ArkodeStepper final : public Stepper {
     std::copy_n(end, y.size(), y.data());
   }
 
-  void interpolate(double t, Eigen::VectorXd& y) override { std::copy_n(state(t), y.size(), y.data()); }
+  void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override {
+    for (size_t i = 0; i < times.size(); ++i)
+      std::copy_n(state(times[i]), Y.rows(), Y.col(static_cast<Eigen::Index>(i)).data());
+  }
 
   StepCounts counts() const override {
     StepCounts all = run_.counts();

@@ -21,20 +21,16 @@ class CvodeStepper final : public Stepper {
     const auto n = static_cast<sunindextype>(problem_.size());
     y_.reset(N_VNew_Serial(n, context_.context));
     out_.reset(N_VNewEmpty_Serial(n, context_.context));
-    cvode_ = CVodeCreate(method, context_.context);
-    if (cvode_ == nullptr || !y_ || !out_) throw NumericalError("SUNDIALS: out of memory");
-    check(CVodeSetErrHandlerFn(cvode_, sundials::quiet, nullptr), "CVodeSetErrHandlerFn");
-    check(CVodeInit(cvode_, &sundials::Problem::derivative, 0.0, y_.get()), "CVodeInit");
-    check(CVodeSetUserData(cvode_, &problem_), "CVodeSetUserData");
-    check(CVodeWFtolerances(cvode_, &sundials::Problem::weights), "CVodeWFtolerances");
-    check(CVodeSetLinearSolver(cvode_, problem_.solver(), problem_.matrix()), "CVodeSetLinearSolver");
-    check(CVodeSetLinSysFn(cvode_, &CvodeStepper::linear_system), "CVodeSetLinSysFn");
-    check(CVodeSetMaxNumSteps(cvode_, -1), "CVodeSetMaxNumSteps");
+    cvode_.reset(CVodeCreate(method, context_.context));
+    if (!cvode_ || !y_ || !out_) throw NumericalError("SUNDIALS: out of memory");
+    check(CVodeSetErrHandlerFn(cvode_.get(), sundials::quiet, nullptr), "CVodeSetErrHandlerFn");
+    check(CVodeInit(cvode_.get(), &sundials::Problem::derivative, 0.0, y_.get()), "CVodeInit");
+    check(CVodeSetUserData(cvode_.get(), &problem_), "CVodeSetUserData");
+    check(CVodeWFtolerances(cvode_.get(), &sundials::Problem::weights), "CVodeWFtolerances");
+    check(CVodeSetLinearSolver(cvode_.get(), problem_.solver(), problem_.matrix()), "CVodeSetLinearSolver");
+    check(CVodeSetLinSysFn(cvode_.get(), &CvodeStepper::linear_system), "CVodeSetLinSysFn");
+    check(CVodeSetMaxNumSteps(cvode_.get(), -1), "CVodeSetMaxNumSteps");
   }
-
-  ~CvodeStepper() override { CVodeFree(&cvode_); }
-  CvodeStepper(const CvodeStepper&) = delete;
-  CvodeStepper& operator=(const CvodeStepper&) = delete;
 
   void restart(double t, const Eigen::VectorXd& y, std::span<const char> contact,
                std::span<const double> levels) override {
@@ -43,34 +39,33 @@ class CvodeStepper final : public Stepper {
     Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(y_.get()), y.size()) = y;
     if (started_) add_counts(past_);
     started_ = true;
-    check(CVodeReInit(cvode_, t, y_.get()), "CVodeReInit");
+    check(CVodeReInit(cvode_.get(), t, y_.get()), "CVodeReInit");
   }
 
   void step(double t_end, double& t, Eigen::VectorXd& y, std::span<int> crossed) override {
-    check(CVodeSetStopTime(cvode_, t_end), "CVodeSetStopTime");
+    check(CVodeSetStopTime(cvode_.get(), t_end), "CVodeSetStopTime");
     const double start = t;
     realtype reached = t;
     crossings_.begin(problem_, start, y.data());
-    const int flag = CVode(cvode_, t_end, y_.get(), &reached, CV_ONE_STEP);
+    const int flag = CVode(cvode_.get(), t_end, y_.get(), &reached, CV_ONE_STEP);
     problem_.rethrow(flag, start, reached);
     check(flag, "CVode");
     const double length = reached - start;
     between_.resize(y.size());
     const auto state_at = [&](double c) {
-      interpolate(start + c * length, between_);
+      state_at_time(start + c * length, between_);
       return between_.data();
     };
     const double c = crossings_.first(problem_, start, length, N_VGetArrayPointer(y_.get()), state_at, crossed);
     t = c < 1 ? start + c * length : reached;
     if (c < 1)
-      interpolate(t, y);
+      state_at_time(t, y);
     else
       y = Eigen::Map<const Eigen::VectorXd>(N_VGetArrayPointer(y_.get()), y.size());
   }
 
-  void interpolate(double t, Eigen::VectorXd& y) override {
-    N_VSetArrayPointer(y.data(), out_.get());
-    check(CVodeGetDky(cvode_, t, 0, out_.get()), "CVodeGetDky");
+  void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override {
+    for (size_t i = 0; i < times.size(); ++i) state_at_time(times[i], Y.col(static_cast<Eigen::Index>(i)));
   }
 
   StepCounts counts() const override {
@@ -86,23 +81,27 @@ class CvodeStepper final : public Stepper {
     return sundials::Problem::linear_system(t, y, jacobian_is_current, jacobian_was_updated, gamma, problem);
   }
 
+  /// Within the last step.
+  void state_at_time(double t, Eigen::Ref<Eigen::VectorXd> y) {
+    N_VSetArrayPointer(y.data(), out_.get());
+    check(CVodeGetDky(cvode_.get(), t, 0, out_.get()), "CVodeGetDky");
+  }
+
   void check(int flag, const char* function) const {
     if (flag >= 0) return;
     realtype t = 0, h = 0;
-    if (cvode_ != nullptr) {
-      CVodeGetCurrentTime(cvode_, &t);
-      CVodeGetLastStep(cvode_, &h);
-    }
+    CVodeGetCurrentTime(cvode_.get(), &t);
+    CVodeGetLastStep(cvode_.get(), &h);
     sundials::fail("CVODE", function, CVodeGetReturnFlagName(flag), t, h);
   }
 
   void add_counts(StepCounts& c) const {
     long steps = 0, rhs = 0, setups = 0, failures = 0, newton = 0;
-    CVodeGetNumSteps(cvode_, &steps);
-    CVodeGetNumRhsEvals(cvode_, &rhs);
-    CVodeGetNumLinSolvSetups(cvode_, &setups);
-    CVodeGetNumErrTestFails(cvode_, &failures);
-    CVodeGetNumNonlinSolvIters(cvode_, &newton);
+    CVodeGetNumSteps(cvode_.get(), &steps);
+    CVodeGetNumRhsEvals(cvode_.get(), &rhs);
+    CVodeGetNumLinSolvSetups(cvode_.get(), &setups);
+    CVodeGetNumErrTestFails(cvode_.get(), &failures);
+    CVodeGetNumNonlinSolvIters(cvode_.get(), &newton);
     c.steps += steps;
     c.rhs_evaluations += rhs;
     c.factorisations += setups;
@@ -115,7 +114,7 @@ class CvodeStepper final : public Stepper {
   sundials::Problem problem_;
   sundials::StepCrossings crossings_;
   sundials::Vector y_, out_;
-  void* cvode_ = nullptr;
+  sundials::Memory<CVodeFree> cvode_;
   Eigen::VectorXd between_;  // a state within a step
   StepCounts past_;
   bool started_ = false;

@@ -147,13 +147,7 @@ class ExponentialStepper final : public Stepper {
     }
   }
 
-  void interpolate(double t, VectorXd& y) override {
-    MatrixXd Y(layout_.size, 1);
-    interpolate_all(std::span(&t, 1), Y);
-    y = Y;
-  }
-
-  void interpolate_all(std::span<const double> times, MatrixXd& Y) override {
+  void interpolate(std::span<const double> times, MatrixXd& Y) override {
     const auto count = std::ssize(times);
     between_.resize(step_.linear->size(), count);
     const auto fraction = [&](Index i) { return (times[static_cast<size_t>(i)] - step_.start) / step_.length; };
@@ -306,9 +300,9 @@ class ExponentialStepper final : public Stepper {
     y_.head(nx_) = step_.X.col(j);
     if (layout_.attitudes_matter && j == 0) y_ = start_;
     if (layout_.attitudes_matter && j > 0) follow_to((*step_.grid)[static_cast<size_t>(j)], c);
-    const double t = force(c);
+    force(c);
     F_.col(j) = y_dot_.head(nx_);
-    motion_.take(j, t, y_, y_dot_);
+    motion_.take(j, y_, y_dot_);
   }
 
   /// Attitudes and places of y_ at a fraction of the step.
@@ -317,13 +311,11 @@ class ExponentialStepper final : public Stepper {
     motion_.place(step_, c, y_);
   }
 
-  /// The derivative of y_ at a fraction of the step, but for what is prescribed; returns the time.
-  double force(double c) {
-    const double t = within_step(c);
-    problem_->derivative(t, y_.data(), contact_, y_dot_.data());
+  /// The derivative of y_ at a fraction of the step, but for what is prescribed.
+  void force(double c) {
+    problem_->derivative(within_step(c), y_.data(), contact_, y_dot_.data());
     ++counts_.rhs_evaluations;
     for (const int i : layout_.prescribed) y_dot_[i] = 0;
-    return t;
   }
 
   /// Sweeps until the points stand still; returns the error in units of the one allowed, infinite when they do not.

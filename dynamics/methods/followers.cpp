@@ -54,7 +54,6 @@ void Followers::start(double t, const VectorXd& y) {
   power_coefficients_.setZero();
   std::ranges::fill(is_split_, 0);
   set_start(y);
-  t_ = t;
   for (Turning& turn : turns_) turn.coefficients.setZero();
   for (size_t i = 0; i < falls_.size(); ++i) {
     const FloatingBodies all = problem_.floating(i, t, y.data());
@@ -78,13 +77,12 @@ void Followers::go_on(const CollocatedStep& step, const VectorXd& y) {
   }
 }
 
-void Followers::take(int j, double t, const VectorXd& y, const VectorXd& y_dot) {
+void Followers::take(int j, const VectorXd& y, const VectorXd& y_dot) {
   power_.col(j) = y_dot.tail(energies_.size());
   remainder_.col(j) = power_.col(j);
   if (power_of_x_.size() > 0) remainder_.col(j).noalias() -= power_of_x_ * y.head(power_of_x_.cols());
   if (!layout_.outside_pushes) return;
-  for (size_t i = 0; i < falls_.size(); ++i)
-    falls_[i].acceleration.col(j) = problem_.outside_acceleration(i, t, y.data());
+  for (size_t i = 0; i < falls_.size(); ++i) falls_[i].acceleration.col(j) = problem_.outside_acceleration(i);
 }
 
 void Followers::forget() {

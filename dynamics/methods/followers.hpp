@@ -27,8 +27,8 @@ class Followers {
   void start(double t, const Eigen::VectorXd& y);
   void go_on(const CollocatedStep&, const Eigen::VectorXd& y);
 
-  /// After a derivative at point j, time t [s] and y.
-  void take(int j, double t, const Eigen::VectorXd& y, const Eigen::VectorXd& y_dot);
+  /// After a derivative at point j and y.
+  void take(int j, const Eigen::VectorXd& y, const Eigen::VectorXd& y_dot);
 
   /// Mass centres are accelerated everywhere as at the start.
   void forget();
@@ -78,7 +78,6 @@ class Followers {
   SplitProblem& problem_;
   const SplitLayout& layout_;
   const ErrorScale& scale_;
-  double t_ = 0;  // of the start
   std::vector<Turning> turns_;
   std::vector<Falling> falls_;
   Eigen::VectorXd energies_;                     // at the start

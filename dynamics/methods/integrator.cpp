@@ -27,23 +27,6 @@ constexpr std::array<IntegratorMethod, 5> methods = {{
 
 }  // namespace
 
-void add_counts(const StepCounts& c, IntegrationSummary& s) {
-  s.steps = c.steps;
-  s.rhs_evaluations = c.rhs_evaluations;
-  s.jacobian_evaluations = c.jacobian_evaluations;
-  s.factorisations = c.factorisations;
-  s.newton_iterations = c.newton_iterations;
-  s.error_test_failures = c.error_test_failures;
-}
-
-void Stepper::interpolate_all(std::span<const double> times, Eigen::MatrixXd& Y) {
-  VectorXd y(Y.rows());
-  for (size_t i = 0; i < times.size(); ++i) {
-    interpolate(times[i], y);
-    Y.col(static_cast<Eigen::Index>(i)) = y;
-  }
-}
-
 std::span<const IntegratorMethod> integrator_methods() { return methods; }
 
 const IntegratorMethod& integrator_method(const std::string& name) {

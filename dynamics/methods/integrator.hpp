@@ -26,16 +26,15 @@ struct IntegratorOptions : FlightOptions {
   bool rescale_at_events = false;
 };
 
+struct StepCounts {
+  long steps = 0, rhs_evaluations = 0, jacobian_evaluations = 0, factorisations = 0, newton_iterations = 0,
+       error_test_failures = 0;
+};
+
 /// What an integration did, and how well it kept what must be kept.
-struct IntegrationSummary {
+struct IntegrationSummary : StepCounts {
   std::string method;
   std::string why_method;  // where the program chose it
-  long steps = 0;
-  long rhs_evaluations = 0;
-  long jacobian_evaluations = 0;
-  long factorisations = 0;
-  long newton_iterations = 0;
-  long error_test_failures = 0;
   long restarts = 0;
   double seconds = 0;
   double energy_balance = 0;        // max |E + dissipated - E0| / max E
@@ -51,13 +50,6 @@ struct ErrorScale {
   double tolerance = 1e-7;  // per step
   Eigen::VectorXd scale;    // one per state, never zero
 };
-
-struct StepCounts {
-  long steps = 0, rhs_evaluations = 0, jacobian_evaluations = 0, factorisations = 0, newton_iterations = 0,
-       error_test_failures = 0;
-};
-
-void add_counts(const StepCounts&, IntegrationSummary&);
 
 /// One integration method on one system. Each step is smooth: the contact flags are constant between restarts.
 class Stepper {
@@ -75,10 +67,8 @@ class Stepper {
   virtual void predict(double /*t_end*/, const std::function<void(const Eigen::VectorXd& y)>&) {}
   /// Largest eigenvalue of the linear part that the last step took out, where the method takes one [1/s].
   virtual double fastest() const { return 0; }
-  /// y within the last step.
-  virtual void interpolate(double t, Eigen::VectorXd& y) = 0;
   /// States within the last step, a column each; Y has the size of a state, and as many columns or more.
-  virtual void interpolate_all(std::span<const double> times, Eigen::MatrixXd& Y);
+  virtual void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) = 0;
   virtual StepCounts counts() const = 0;
 };
 

@@ -3,7 +3,6 @@
 #include "dynamics/model/multibody.hpp"
 
 #include <array>
-#include <span>
 #include <string_view>
 
 namespace flexboom {

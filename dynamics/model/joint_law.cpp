@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace flexboom {
 
@@ -84,6 +83,16 @@ LawBranch LawModel::branch(const LawState& s) const {
   if (s.motion == LawState::Motion::forward) b.friction = -friction->coulomb;
   if (s.motion == LawState::Motion::back) b.friction = friction->coulomb;
   return b;
+}
+
+bool LawModel::fits(const LawState& s) const {
+  using Motion = LawState::Motion;
+  const bool rests = s.rests_at != 0, has_its_stop = (s.rests_at > 0 ? upper : lower).has_value();
+  const bool moves_so = s.motion == Motion::held   ? friction || rests || s.latched
+                        : s.motion == Motion::free ? !friction
+                                                   : friction.has_value();
+  return s.beyond.size() == ramps.size() && s.pushes.size() == ramps.size() && s.faster.size() == rate_ramps.size() &&
+         moves_so && (!rests || has_its_stop) && (!s.latched || latch);
 }
 
 double LawModel::spring_energy(double x) const {
@@ -203,7 +212,7 @@ class LawCheck {
   void friction() {
     if (!law_.friction) return;
     const auto& [coulomb, breakaway] = *law_.friction;
-    not_negative("friction.coulomb", coulomb);
+    if (!(coulomb >= 0 && std::isfinite(coulomb))) return not_negative("friction.coulomb", coulomb);
     if (!(breakaway > 0 && std::isfinite(breakaway)))
       add("friction.breakaway", fmt::format("is {}; it must be positive", breakaway));
     else if (breakaway < coulomb)

@@ -116,6 +116,8 @@ struct LawModel {
   double spring_energy(double x) const;
   double stop_energy(double x) const;
   bool can_hold() const { return friction || lower || upper || latch; }
+  /// Can this law be in a state, which a run of another law may have left?
+  bool fits(const LawState&) const;
 };
 
 }  // namespace flexboom

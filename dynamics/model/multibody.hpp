@@ -11,7 +11,6 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace flexboom {
@@ -88,5 +87,11 @@ struct Multibody {
   /// Instead: of a planet. Positions are from the reference point of the orbit, whose free fall is taken off.
   std::optional<OrbitalField> field{};
 };
+
+/// Where a place is in the undeformed BRF [m].
+inline Eigen::Vector3d position_of(const Multibody& scene, const Place& place) {
+  return place.marker.empty() ? place.position
+                              : marker(scene.bodies[static_cast<std::size_t>(place.body)], place.marker).position;
+}
 
 }  // namespace flexboom

@@ -1,6 +1,7 @@
 #include "dynamics/model/multibody_check.hpp"
 
 #include "dynamics/model/joint.hpp"
+#include "dynamics/model/joint_law.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
@@ -33,6 +34,10 @@ void check_joint(const Multibody& scene, const Joint& joint) {
   for (const TimeFunction& f : joint.prescribed)
     require(f.value && f.rate && f.acceleration,
             fmt::format("joint {}: a prescribed motion needs its value, rate and acceleration", joint.name));
+  require(joint.prescribed.empty() || m.stop_stiffness == 0,
+          fmt::format("joint {}: it has a stop beside a prescribed motion, which no stop can change", joint.name));
+  for (const LawFault& fault : law_faults(joint))
+    throw InputError(fmt::format("joint {}: {} {}", joint.name, fault.key, fault.text));
 }
 
 }  // namespace

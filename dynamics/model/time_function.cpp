@@ -220,9 +220,11 @@ TimeCourse time_table(const TimeTable& table) {
   c.function = split([pieces = table_pieces(table), begin, end, first = table.value.front(), last = table.value.back(),
                       hold](double t) -> std::array<double, 3> {
     if (t >= begin && t <= end) return at(piece_at(pieces, t), t);
-    require(hold, fmt::format("table of times: it ends at {:g} s and {:g} s, and {:g} s was asked for; make it longer "
-                              "or set outside = \"hold\"",
-                              begin, end, t));
+    if (!hold)
+      throw InputError(
+          fmt::format("table of times: it ends at {:g} s and {:g} s, and {:g} s was asked for; make it "
+                      "longer or set outside = \"hold\"",
+                      begin, end, t));
     return {t < begin ? first : last, 0, 0};
   });
   return c;

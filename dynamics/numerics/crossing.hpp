@@ -5,8 +5,8 @@
 
 namespace flexboom {
 
-/// Distance of a hinge from its stop on the side where its flag says that it is (negative: it has crossed), at a place
-/// c of a step, and its slope there.
+/// Distance of a hinge from its stop on the side where its flag says that it is (negative: it has crossed), at the
+/// share c of a step, and its slope there, over that share.
 struct Clearance {
   double c = 0, value = 0, slope = 0;
 };

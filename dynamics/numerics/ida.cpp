@@ -7,9 +7,7 @@
 #include <ida/ida.h>
 #include <ida/ida_ls.h>
 #include <nvector/nvector_serial.h>
-#include <sunlinsol/sunlinsol_dense.h>
 #include <sunlinsol/sunlinsol_klu.h>
-#include <sunmatrix/sunmatrix_dense.h>
 #include <sunmatrix/sunmatrix_sparse.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 
@@ -26,64 +24,46 @@ struct Ida::Impl {
   sundials::Matrix matrix;
   sundials::LinearSolver solver;
   sundials::NonlinearSolver nonlinear;
+  sundials::Memory<IDAFree> ida;
   double last_correction = 0;
   bool fresh = false;  // the matrix is of this step
-  void* ida = nullptr;
   std::exception_ptr error;
   DaeCounts past;
   bool started = false;
 
-  Impl(DaeProblem& of, const std::string& linear_solver) : problem(of) {
+  explicit Impl(DaeProblem& of) : problem(of) {
     const auto n = static_cast<sunindextype>(problem.size());
     for (sundials::Vector* v : {&y, &y_dot, &id}) v->reset(N_VNew_Serial(n, context.context));
     out.reset(N_VNewEmpty_Serial(n, context.context));
-    make_solver(linear_solver, n);
-    ida = IDACreate(context.context);
-    if (ida == nullptr || !y || !y_dot || !id || !out || !matrix || !solver)
-      throw NumericalError("SUNDIALS: out of memory");
+    matrix.reset(SUNSparseMatrix(n, n, static_cast<sunindextype>(problem.rows().size()), CSC_MAT, context.context));
+    solver.reset(SUNLinSol_KLU(y.get(), matrix.get(), context.context));
+    ida.reset(IDACreate(context.context));
+    if (!ida || !y || !y_dot || !id || !out || !matrix || !solver) throw NumericalError("SUNDIALS: out of memory");
     Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(id.get()), n) = problem.differential();
-    check(IDASetErrHandlerFn(ida, sundials::quiet, nullptr), "IDASetErrHandlerFn");
-    check(IDAInit(ida, &Impl::residual, 0.0, y.get(), y_dot.get()), "IDAInit");
-    check(IDASetUserData(ida, this), "IDASetUserData");
-    check(IDAWFtolerances(ida, &Impl::weights), "IDAWFtolerances");
-    check(IDASetId(ida, id.get()), "IDASetId");
-    check(IDASetSuppressAlg(ida, SUNTRUE), "IDASetSuppressAlg");
-    check(IDASetLinearSolver(ida, solver.get(), matrix.get()), "IDASetLinearSolver");
-    check(IDASetJacFn(ida, &Impl::jacobian), "IDASetJacFn");
+    check(IDASetErrHandlerFn(ida.get(), sundials::quiet, nullptr), "IDASetErrHandlerFn");
+    check(IDAInit(ida.get(), &Impl::residual, 0.0, y.get(), y_dot.get()), "IDAInit");
+    check(IDASetUserData(ida.get(), this), "IDASetUserData");
+    check(IDAWFtolerances(ida.get(), &Impl::weights), "IDAWFtolerances");
+    check(IDASetId(ida.get(), id.get()), "IDASetId");
+    check(IDASetSuppressAlg(ida.get(), SUNTRUE), "IDASetSuppressAlg");
+    check(IDASetLinearSolver(ida.get(), solver.get(), matrix.get()), "IDASetLinearSolver");
+    check(IDASetJacFn(ida.get(), &Impl::jacobian), "IDASetJacFn");
     // Algebraic rows do not scale with 1 / h: corrections by an old matrix must not be scaled either.
-    check(IDASetLinearSolutionScaling(ida, SUNFALSE), "IDASetLinearSolutionScaling");
+    check(IDASetLinearSolutionScaling(ida.get(), SUNFALSE), "IDASetLinearSolutionScaling");
     nonlinear.reset(SUNNonlinSol_Newton(y.get(), context.context));
-    check(IDASetNonlinearSolver(ida, nonlinear.get()), "IDASetNonlinearSolver");
+    check(IDASetNonlinearSolver(ida.get(), nonlinear.get()), "IDASetNonlinearSolver");
     check(SUNNonlinSolSetConvTestFn(nonlinear.get(), &Impl::converged, this), "SUNNonlinSolSetConvTestFn");
     check(SUNNonlinSolSetMaxIters(nonlinear.get(), 7), "SUNNonlinSolSetMaxIters");
-    check(IDASetMaxNumSteps(ida, -1), "IDASetMaxNumSteps");
-    if (problem.roots() > 0) check(IDARootInit(ida, problem.roots(), &Impl::roots), "IDARootInit");
-    check(IDASetNoInactiveRootWarn(ida), "IDASetNoInactiveRootWarn");
-  }
-  ~Impl() { IDAFree(&ida); }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
-  void make_solver(const std::string& name, sunindextype n) {
-    if (name == "dense") {
-      matrix.reset(SUNDenseMatrix(n, n, context.context));
-      solver.reset(SUNLinSol_Dense(y.get(), matrix.get(), context.context));
-    } else if (name == "klu") {
-      const auto entries = static_cast<sunindextype>(problem.rows().size());
-      matrix.reset(SUNSparseMatrix(n, n, entries, CSC_MAT, context.context));
-      solver.reset(SUNLinSol_KLU(y.get(), matrix.get(), context.context));
-    } else {
-      throw InputError(fmt::format("linear solver '{}' is not known; there are: 'klu' 'dense'", name));
-    }
+    check(IDASetMaxNumSteps(ida.get(), -1), "IDASetMaxNumSteps");
+    if (problem.roots() > 0) check(IDARootInit(ida.get(), problem.roots(), &Impl::roots), "IDARootInit");
+    check(IDASetNoInactiveRootWarn(ida.get()), "IDASetNoInactiveRootWarn");
   }
 
   void check(int flag, const char* function) const {
     if (flag >= 0) return;
     realtype t = 0, h = 0;
-    if (ida != nullptr) {
-      IDAGetCurrentTime(ida, &t);
-      IDAGetLastStep(ida, &h);
-    }
+    IDAGetCurrentTime(ida.get(), &t);
+    IDAGetLastStep(ida.get(), &h);
     sundials::fail("IDA", function, IDAGetReturnFlagName(flag), t, h);
   }
 
@@ -109,16 +89,9 @@ struct Ida::Impl {
                       N_Vector, N_Vector) noexcept {
     return guarded(user, [&](Impl& self) {
       self.fresh = true;
-      double* values = nullptr;
-      if (SUNMatGetID(J) == SUNMATRIX_SPARSE) {
-        std::copy(self.problem.column_starts().begin(), self.problem.column_starts().end(),
-                  SUNSparseMatrix_IndexPointers(J));
-        std::copy(self.problem.rows().begin(), self.problem.rows().end(), SUNSparseMatrix_IndexValues(J));
-        values = SUNSparseMatrix_Data(J);
-      } else {
-        values = SUNDenseMatrix_Data(J);
-      }
-      self.problem.newton_matrix(t, c, N_VGetArrayPointer(y), N_VGetArrayPointer(y_dot), values);
+      std::ranges::copy(self.problem.column_starts(), SUNSparseMatrix_IndexPointers(J));
+      std::ranges::copy(self.problem.rows(), SUNSparseMatrix_IndexValues(J));
+      self.problem.newton_matrix(t, c, N_VGetArrayPointer(y), N_VGetArrayPointer(y_dot), SUNSparseMatrix_Data(J));
     });
   }
 
@@ -155,58 +128,61 @@ struct Ida::Impl {
     return rate > 0.95 && size >= round_off ? SUN_NLS_CONV_RECVR : SUN_NLS_CONTINUE;
   }
 
-  void add_counts(DaeCounts& c) const {
-    long steps = 0, residuals = 0, setups = 0, failures = 0, newton = 0, convergence = 0;
-    IDAGetNumSteps(ida, &steps);
-    IDAGetNumResEvals(ida, &residuals);
-    IDAGetNumLinSolvSetups(ida, &setups);
-    IDAGetNumErrTestFails(ida, &failures);
-    IDAGetNumNonlinSolvIters(ida, &newton);
-    IDAGetNumNonlinSolvConvFails(ida, &convergence);
-    c.steps += steps;
-    c.residual_evaluations += residuals;
-    c.factorisations += setups;
-    c.error_test_failures += failures;
-    c.newton_iterations += newton;
-    c.convergence_failures += convergence;
+  /// Since the last start.
+  DaeCounts counts() const {
+    DaeCounts c;
+    IDAGetNumSteps(ida.get(), &c.steps);
+    IDAGetNumResEvals(ida.get(), &c.residual_evaluations);
+    IDAGetNumLinSolvSetups(ida.get(), &c.factorisations);
+    IDAGetNumErrTestFails(ida.get(), &c.error_test_failures);
+    IDAGetNumNonlinSolvIters(ida.get(), &c.newton_iterations);
+    IDAGetNumNonlinSolvConvFails(ida.get(), &c.convergence_failures);
+    return c;
   }
 };
 
-Ida::Ida(DaeProblem& problem, const std::string& linear_solver)
-    : impl_(std::make_unique<Impl>(problem, linear_solver)) {}
+DaeCounts& DaeCounts::operator+=(const DaeCounts& c) {
+  steps += c.steps, residual_evaluations += c.residual_evaluations, factorisations += c.factorisations;
+  newton_iterations += c.newton_iterations, error_test_failures += c.error_test_failures;
+  convergence_failures += c.convergence_failures;
+  return *this;
+}
+
+Ida::Ida(DaeProblem& problem) : impl_(std::make_unique<Impl>(problem)) {}
 Ida::~Ida() = default;
 
 void Ida::restart(double t, const Eigen::VectorXd& y, const Eigen::VectorXd& y_dot) {
   Impl& s = *impl_;
+  s.error = nullptr;
   Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(s.y.get()), y.size()) = y;
   Eigen::Map<Eigen::VectorXd>(N_VGetArrayPointer(s.y_dot.get()), y.size()) = y_dot;
-  if (s.started) s.add_counts(s.past);
+  if (s.started) s.past += s.counts();
   s.started = true;
-  s.check(IDAReInit(s.ida, t, s.y.get(), s.y_dot.get()), "IDAReInit");
+  s.check(IDAReInit(s.ida.get(), t, s.y.get(), s.y_dot.get()), "IDAReInit");
 }
 
 void Ida::step(double t_end, double& t, Eigen::VectorXd& y, std::span<int> crossed) {
   Impl& s = *impl_;
-  s.check(IDASetStopTime(s.ida, t_end), "IDASetStopTime");
+  s.check(IDASetStopTime(s.ida.get(), t_end), "IDASetStopTime");
   realtype reached = t;
-  const int flag = IDASolve(s.ida, t_end, &reached, s.y.get(), s.y_dot.get(), IDA_ONE_STEP);
+  const int flag = IDASolve(s.ida.get(), t_end, &reached, s.y.get(), s.y_dot.get(), IDA_ONE_STEP);
   if (s.error) std::rethrow_exception(std::exchange(s.error, nullptr));
   s.check(flag, "IDASolve");
   t = reached;
   y = Eigen::Map<const Eigen::VectorXd>(N_VGetArrayPointer(s.y.get()), y.size());
   std::fill(crossed.begin(), crossed.end(), 0);
-  if (flag == IDA_ROOT_RETURN) s.check(IDAGetRootInfo(s.ida, crossed.data()), "IDAGetRootInfo");
+  if (flag == IDA_ROOT_RETURN) s.check(IDAGetRootInfo(s.ida.get(), crossed.data()), "IDAGetRootInfo");
 }
 
 void Ida::interpolate(double t, Eigen::VectorXd& y) {
   Impl& s = *impl_;
   N_VSetArrayPointer(y.data(), s.out.get());
-  s.check(IDAGetDky(s.ida, t, 0, s.out.get()), "IDAGetDky");
+  s.check(IDAGetDky(s.ida.get(), t, 0, s.out.get()), "IDAGetDky");
 }
 
 DaeCounts Ida::counts() const {
   DaeCounts c = impl_->past;
-  if (impl_->started) impl_->add_counts(c);
+  if (impl_->started) c += impl_->counts();
   return c;
 }
 

@@ -4,8 +4,6 @@
 
 #include <memory>
 #include <span>
-#include <string>
-#include <vector>
 
 namespace flexboom {
 
@@ -17,9 +15,9 @@ class DaeProblem {
   /// 1 where an unknown is differential and its error counts, 0 where it is algebraic.
   virtual Eigen::VectorXd differential() const = 0;
   virtual void residual(double t, const double* y, const double* y_dot, double* F) = 0;
-  /// Values of dF/dy + c dF/dy_dot in the pattern below; dense: by columns.
+  /// Values of dF/dy + c dF/dy_dot in the pattern below.
   virtual void newton_matrix(double t, double c, const double* y, const double* y_dot, double* values) = 0;
-  virtual std::span<const int> column_starts() const = 0;  // compressed columns; empty: dense
+  virtual std::span<const int> column_starts() const = 0;  // compressed columns
   virtual std::span<const int> rows() const = 0;
   /// Inverse of the errors allowed per step.
   virtual void weights(double* w) const = 0;
@@ -30,13 +28,15 @@ class DaeProblem {
 struct DaeCounts {
   long steps = 0, residual_evaluations = 0, factorisations = 0, newton_iterations = 0, error_test_failures = 0,
        convergence_failures = 0;
+
+  DaeCounts& operator+=(const DaeCounts&);
 };
 
-/// SUNDIALS IDA (BDF of order 1 to 5 with variable step) on one problem; Newton by KLU or a dense LU.
+/// SUNDIALS IDA (BDF of order 1 to 5 with variable step) on one problem; Newton by KLU.
 class Ida {
  public:
-  /// @throws InputError for an unknown linear solver.
-  Ida(DaeProblem&, const std::string& linear_solver);
+  /// @throws NumericalError where SUNDIALS has no memory.
+  explicit Ida(DaeProblem&);
   ~Ida();
   Ida(const Ida&) = delete;
   Ida& operator=(const Ida&) = delete;

@@ -3,7 +3,6 @@
 #include "dynamics/numerics/phi.hpp"
 #include "fem/base/lanes.hpp"
 
-#include <complex>
 #include <utility>
 
 namespace flexboom {

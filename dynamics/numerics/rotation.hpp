@@ -23,6 +23,12 @@ inline Eigen::Vector4d quaternion_of(const Eigen::Vector3d& theta) {
   return {std::cos(half), s * theta.x(), s * theta.y(), s * theta.z()};
 }
 
+/// The quaternion (w, x, y, z) of a rotation matrix.
+inline Eigen::Vector4d quaternion_of_axes(const Eigen::Matrix3d& A) {
+  const Eigen::Quaterniond q(A);
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
 /// Rotation matrix body -> inertial of a quaternion (w, x, y, z), normalised first.
 inline Eigen::Matrix3d rotation_matrix(const Eigen::Vector4d& q) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();

@@ -108,6 +108,13 @@ T& component(Sym3<T>& a, I i) {
 
 inline Vec3<double> vec3(const Eigen::Vector3d& a) { return {a.x(), a.y(), a.z()}; }
 inline Eigen::Vector3d eigen(const Vec3<double>& a) { return {a.x, a.y, a.z}; }
+inline Mat3<double> mat3(const Eigen::Matrix3d& a) {
+  return {{vec3(a.row(0).transpose()), vec3(a.row(1).transpose()), vec3(a.row(2).transpose())}};
+}
+inline Eigen::Matrix3d eigen(const Mat3<double>& a) {
+  return Eigen::Matrix3d{
+      {a.row[0].x, a.row[0].y, a.row[0].z}, {a.row[1].x, a.row[1].y, a.row[1].z}, {a.row[2].x, a.row[2].y, a.row[2].z}};
+}
 inline Sym3<double> sym3(const Eigen::Matrix3d& a) { return {a(0, 0), a(1, 1), a(2, 2), a(0, 1), a(1, 2), a(2, 0)}; }
 inline Eigen::Matrix3d eigen(const Sym3<double>& a) {
   return Eigen::Matrix3d{{a.xx, a.xy, a.zx}, {a.xy, a.yy, a.yz}, {a.zx, a.yz, a.zz}};

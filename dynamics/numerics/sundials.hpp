@@ -27,6 +27,14 @@ using LinearSolver = std::unique_ptr<_generic_SUNLinearSolver, Deleter<_generic_
 using NonlinearSolver =
     std::unique_ptr<_generic_SUNNonlinearSolver, Deleter<_generic_SUNNonlinearSolver, SUNNonlinSolFree>>;
 
+/// What a solver of SUNDIALS allocates.
+template <auto Free>
+struct FreeMemory {
+  void operator()(void* memory) const { Free(&memory); }
+};
+template <auto Free>
+using Memory = std::unique_ptr<void, FreeMemory<Free>>;
+
 struct Context {
   SUNContext context = nullptr;
   /// @throws NumericalError when there is none.

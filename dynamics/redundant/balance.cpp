@@ -40,18 +40,15 @@ Balance balance_of(const Equations& equations, const VectorXd& y, const JointMem
     first_moment += body.m * s.position + of.first_moment;
   }
   b.angular_momentum -= (first_moment / m).cross(b.momentum);
-  b.elastic = equations.potential(y.data(), memory);
+  b.ledger = equations.ledger(y.data(), memory);
+  b.elastic = b.ledger.stored(), b.dissipated = b.ledger.lost(), b.work = y[equations.work()];
+  b.potential = 0 - scene.gravity.dot(first_moment);
   return b;
 }
 
 void set_drifts(const Multibody& scene, const MotionScales& before, MultibodyTrajectory& r) {
   Conservation kept(scene.bodies, before);
-  for (size_t i = 0; i < r.time.size(); ++i) {
-    const Balance& b = r.balance[i];
-    const MultibodyState& at = r.states[i];
-    kept.add(b.kinetic + b.elastic + at.dissipated - at.work,
-             std::max({std::abs(b.kinetic) + std::abs(b.elastic), std::abs(at.work), at.dissipated}), b);
-  }
+  for (const Balance& b : r.balance) kept.add(b);
   r.summary.largest = kept.largest();
   r.summary.energy_balance = kept.energy_balance();
   if (is_isolated(scene)) r.summary.momentum_drift = kept.momentum_drift();

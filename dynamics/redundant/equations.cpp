@@ -2,6 +2,9 @@
 
 #include "dynamics/numerics/rotation.hpp"
 #include "dynamics/redundant/scratch.hpp"
+#include "fem/base/check.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 
@@ -67,6 +70,13 @@ int Equations::holding(size_t joint) const {
 }
 
 VectorXd Equations::pack(const std::vector<BodyState>& states) const {
+  require(states.size() == scene_.bodies.size(),
+          fmt::format("{} bodies need as many states, {} were given", scene_.bodies.size(), states.size()));
+  for (size_t i = 0; i < states.size(); ++i)
+    for (const VectorXd* q : {&states[i].q, &states[i].q_dot})
+      require(q->size() == 0 || q->size() == scene_.bodies[i].n(),
+              fmt::format("body \"{}\" has {} elastic coordinates, {} were given", scene_.bodies[i].name,
+                          scene_.bodies[i].n(), q->size()));
   VectorXd y = VectorXd::Zero(size_);
   for (size_t i = 0; i < places_.size(); ++i) {
     const BodyPlaces& at = places_[i];
@@ -344,18 +354,6 @@ EnergyLedger Equations::ledger(const double* y, const JointMemory& memory) const
   }
   e.elsewhere = y[dissipated()];
   return e;
-}
-
-double Equations::potential(const double* y, const JointMemory& memory) const {
-  double energy = ledger(y, memory).stored();
-  for (size_t i = 0; i < places_.size(); ++i) {
-    const BodyPlaces& at = places_[i];
-    DeformedBody<double>& deformed = scratch_->bodies[i].deformed;
-    deform(prepared_.bodies[i], y + at.q, deformed);
-    energy -= scene_.gravity.dot(scene_.bodies[i].m * Map<const Vector3d>(y + at.R) +
-                                 eigen(rotation(y + at.p) * deformed.mc));
-  }
-  return energy;
 }
 
 Equations::Momenta Equations::momenta(size_t i, const double* y) const {

@@ -44,7 +44,7 @@ class PatternSum {
       for (Eigen::Index i = 0; i < block.rows(); ++i)
         add(row + static_cast<int>(i), column + static_cast<int>(j), block(i, j));
   }
-  void finish(int size, bool dense);
+  void finish(int size);
   /// Starts over in these values.
   void begin(double* values);
 
@@ -56,7 +56,7 @@ class PatternSum {
   std::vector<std::pair<int, int>> places_;
   std::vector<size_t> slots_;
   std::vector<int> starts_, rows_;
-  size_t next_ = 0, count_ = 0;
+  size_t next_ = 0;
   double* values_ = nullptr;
 };
 
@@ -142,8 +142,6 @@ class Equations {
   /// Angle or way of a joint less its threshold: keeps its digits near the stop.
   DriveMotion<double> gap(size_t i, const double* y, double near) const;
   std::vector<JointReaction> loads(double t, const double* y);
-  /// Potential energy of mechanisms, springs, bodies and gravity.
-  double potential(const double* y, const JointMemory&) const;
   /// Of mechanisms, springs and bodies, and what was lost.
   EnergyLedger ledger(const double* y, const JointMemory&) const;
   /// Motion of the two places of a joint at time t.

@@ -36,9 +36,9 @@ void FlightFrame::leave(double t, MultibodyState& s, Balance& b) const {
     body.velocity += velocity_;
   }
   // What loads gave the momentum, which begins at zero here, they did on the way of this frame, too.
-  if (loaded_) s.work += velocity_.dot(b.momentum - mass_ * (t - start_) * gravity_);
+  if (loaded_) b.work += velocity_.dot(b.momentum - mass_ * (t - start_) * gravity_);
   b.kinetic += velocity_.dot(b.momentum) + 0.5 * mass_ * velocity_.squaredNorm();
-  b.elastic -= mass_ * gravity_.dot(way);
+  b.potential -= mass_ * gravity_.dot(way);
   b.momentum += mass_ * velocity_;
   b.momentum_scale += mass_ * velocity_.norm();
 }

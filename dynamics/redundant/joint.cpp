@@ -1,8 +1,6 @@
 #include "dynamics/redundant/joint.hpp"
 
-#include "fem/base/check.hpp"
-
-#include <fmt/format.h>
+#include <algorithm>
 
 namespace flexboom::redundant {
 namespace {
@@ -15,7 +13,6 @@ constexpr Vec3<double> X{1, 0, 0}, Y{0, 1, 0}, Z{0, 0, 1};
 /// What each kind of joint holds, and what a prescribed freedom adds.
 struct KindRows {
   JointKind kind;
-  const char* name;
   std::vector<Row> held, driven;
 };
 
@@ -33,16 +30,15 @@ const std::vector<KindRows>& table() {
   static const std::vector<KindRows> rows = [] {
     const Row px = along(X, "position along x"), py = along(Y, "position along y"), pz = along(Z, "position along z");
     const Row xz = across(X, Z, "tilt about y"), yz = across(Y, Z, "tilt about x"), yx = across(Y, X, "turn about z");
-    return std::vector<KindRows>{{JointKind::fixed, "fixed", {px, py, pz, xz, yz, yx}, {}},
-                                 {JointKind::hinge, "hinge", {px, py, pz, xz, yz}, {driven(yx, Drive::turn_e, 0)}},
-                                 {JointKind::slider, "slider", {px, py, xz, yz, yx}, {driven(pz, Drive::shift, 0)}},
+    return std::vector<KindRows>{{JointKind::fixed, {px, py, pz, xz, yz, yx}, {}},
+                                 {JointKind::hinge, {px, py, pz, xz, yz}, {driven(yx, Drive::turn_e, 0)}},
+                                 {JointKind::slider, {px, py, xz, yz, yx}, {driven(pz, Drive::shift, 0)}},
                                  {JointKind::universal,
-                                  "universal",
                                   {px, py, pz, across(Z, Y, "axes normal to each other")},
                                   {driven(across(X, Y, "turn about z"), Drive::turn_e, 0),
                                    driven(across(Z, X, "turn about y"), Drive::turn_f, 1)}},
-                                 {JointKind::spherical, "spherical", {px, py, pz}, {}},
-                                 {JointKind::free, "free", {}, {}}};
+                                 {JointKind::spherical, {px, py, pz}, {}},
+                                 {JointKind::free, {}, {}}};
   }();
   return rows;
 }
@@ -50,25 +46,14 @@ const std::vector<KindRows>& table() {
 }  // namespace
 
 std::vector<Row> joint_rows(const Joint& joint) {
-  for (const KindRows& k : table()) {
-    if (k.kind != joint.kind) continue;
-    std::vector<Row> rows = k.held;
-    if (joint.law.given() && LawModel(joint).can_hold()) {
-      rows.push_back(k.driven.front());
-      rows.back().holds = true;
-    }
-    if (joint.prescribed.empty()) return rows;
-    require(!k.driven.empty(),
-            fmt::format("joint \"{}\": the motion of a {} joint can not be prescribed; of a hinge, slider or universal "
-                        "joint it can",
-                        joint.name, k.name));
-    require(joint.prescribed.size() == k.driven.size(),
-            fmt::format("joint \"{}\": {} functions prescribe its motion, a {} joint needs {}", joint.name,
-                        joint.prescribed.size(), k.name, k.driven.size()));
-    rows.insert(rows.end(), k.driven.begin(), k.driven.end());
-    return rows;
+  const KindRows& k = *std::ranges::find(table(), joint.kind, &KindRows::kind);
+  std::vector<Row> rows = k.held;
+  if (joint.law.given() && LawModel(joint).can_hold()) {
+    rows.push_back(k.driven.front());
+    rows.back().holds = true;
   }
-  throw InputError(fmt::format("joint \"{}\": unknown kind", joint.name));
+  if (!joint.prescribed.empty()) rows.insert(rows.end(), k.driven.begin(), k.driven.end());
+  return rows;
 }
 
 }  // namespace flexboom::redundant

@@ -211,7 +211,9 @@ void act_spring(const JointData& places, const SpringDamper& spring, const PairM
                 const PlaceMotion<T>& b, PairForces<T>& out, T& loss) {
   using std::sqrt;
   const Vec3<T> d = b.r - a.r;
-  const T length = sqrt(dot(d, d));
+  const T squared = dot(d, d);
+  if (!(value(squared) > 0)) return;  // no direction
+  const T length = sqrt(squared);
   const T rate = dot(d, b.r_dot - a.r_dot) / length;
   const T pull = (spring.stiffness * (length - spring.free_length) + spring.damping * rate) / length;
   add_pair(places, x, a, b, -(pull * d), Vec3<T>{}, out);

@@ -1,5 +1,6 @@
 #include "dynamics/redundant/multipliers.hpp"
 
+#include "dynamics/model/joint.hpp"
 #include "dynamics/model/multibody_check.hpp"
 #include "dynamics/model/second_order_shapes.hpp"
 #include "dynamics/numerics/rotation.hpp"
@@ -17,6 +18,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
+using spatial::eigen;
+using spatial::vec3;
 
 namespace redundant {
 
@@ -74,11 +77,9 @@ BodyData body_data(const ReducedBody& body, Stiffening stiffening) {
 PlaceData place_data(const Multibody& scene, const std::vector<Stiffening>& stiffening, const Place& place) {
   PlaceData p;
   p.body = place.body;
-  Vector3d position = place.position;
   if (!place.marker.empty()) {
     const ReducedBody& body = scene.bodies[static_cast<size_t>(place.body)];
     const Marker& m = marker(body, place.marker);
-    position = m.position;
     p.flexible = body.n() > 0;
     p.S = m.S, p.S_theta = m.S_theta;
     if (p.flexible && p.S.cols() == 0) p.S = Eigen::Matrix3Xd::Zero(3, body.n());
@@ -89,8 +90,8 @@ PlaceData place_data(const Multibody& scene, const std::vector<Stiffening>& stif
       p.theta_slope = entries_of(K.torque, -1);
     }
   }
-  p.position = spatial::vec3(position);
-  for (size_t i = 0; i < 3; ++i) p.axes.row[i] = spatial::vec3(place.axes.row(static_cast<Index>(i)).transpose());
+  p.position = vec3(position_of(scene, place));
+  p.axes = spatial::mat3(place.axes);
   return p;
 }
 
@@ -138,38 +139,14 @@ struct Relative {
 
 Matrix3d about(const Vector3d& axis, double angle) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); }
 
-Matrix3d exponential_map(const Vector3d& v) {
-  return v.norm() > 0 ? about(v.normalized(), v.norm()) : Matrix3d::Identity();
-}
-
 /// d/dt exp(v) = tilde(J_l(v) v_dot) exp(v).
 Matrix3d left_jacobian(const Vector3d& v) {
-  const double a = v.norm();
-  if (a < 1e-6) return Matrix3d::Identity() + 0.5 * tilde(v);
-  return Matrix3d::Identity() + (1 - std::cos(a)) / (a * a) * tilde(v) +
-         (a - std::sin(a)) / (a * a * a) * tilde(v) * tilde(v);
+  const double x = v.squaredNorm();
+  return eigen(isotropic(1.0, rotation_series(x, 2), rotation_series(x, 3), vec3(v)));
 }
 
 Relative relative_motion(const Joint& joint, std::vector<double> c, std::vector<double> r) {
-  size_t freedoms = 0;
-  switch (joint.kind) {
-    case JointKind::fixed:
-      freedoms = 0;
-      break;
-    case JointKind::hinge:
-    case JointKind::slider:
-      freedoms = 1;
-      break;
-    case JointKind::universal:
-      freedoms = 2;
-      break;
-    case JointKind::spherical:
-      freedoms = 3;
-      break;
-    case JointKind::free:
-      freedoms = 6;
-      break;
-  }
+  const auto freedoms = static_cast<size_t>(joint_type(joint.kind).freedoms);
   for (std::vector<double>* list : {&c, &r}) {
     if (list->empty()) list->assign(freedoms, 0.0);
     require(list->size() == freedoms,
@@ -186,15 +163,11 @@ Relative relative_motion(const Joint& joint, std::vector<double> c, std::vector<
   const size_t first = joint.kind == JointKind::free ? 3 : 0;
   if (joint.kind == JointKind::spherical || joint.kind == JointKind::free) {
     const Vector3d v(c[first], c[first + 1], c[first + 2]), v_dot(r[first], r[first + 1], r[first + 2]);
-    m.turn = exponential_map(v);
+    m.turn = rotation_matrix(quaternion_of(v));
     m.omega = left_jacobian(v) * v_dot;
   }
   if (joint.kind == JointKind::free) m.way = {c[0], c[1], c[2]}, m.way_rate = {r[0], r[1], r[2]};
   return m;
-}
-
-Vector3d undeformed_position(const Multibody& scene, const Place& p) {
-  return p.marker.empty() ? p.position : marker(scene.bodies[static_cast<size_t>(p.body)], p.marker).position;
 }
 
 }  // namespace
@@ -216,14 +189,13 @@ std::vector<BodyState> place_bodies(const Multibody& scene, const std::vector<st
       BodyState root;
       const BodyState& a = j.a.body < 0 ? root : states[static_cast<size_t>(j.a.body)];
       const Matrix3d A = rotation_matrix(a.attitude), axes = A * j.a.axes, B = axes * m.turn * j.b.axes.transpose();
-      const Vector3d arm_a = A * undeformed_position(scene, j.a), arm_b = B * undeformed_position(scene, j.b);
+      const Vector3d arm_a = A * position_of(scene, j.a), arm_b = B * position_of(scene, j.b);
       const Vector3d omega_a = A * a.omega, omega = omega_a + axes * m.omega, way = axes * m.way;
       BodyState& b = states[static_cast<size_t>(j.b.body)];
       b.position = a.position + arm_a + way - arm_b;
       b.velocity = a.velocity + omega_a.cross(arm_a + way) + axes * m.way_rate - omega.cross(arm_b);
       b.omega = B.transpose() * omega;
-      const Eigen::Quaterniond turn(B);
-      b.attitude = {turn.w(), turn.x(), turn.y(), turn.z()};
+      b.attitude = quaternion_of_axes(B);
       placed[static_cast<size_t>(j.b.body)] = 1;
       progress = true;
     }
@@ -241,7 +213,6 @@ std::vector<BodyState> place_bodies(const Multibody& scene, const std::vector<st
 
 std::vector<BodyState> close_joints(const Multipliers& system, const std::vector<BodyState>& states, double t) {
   Equations e(system.impl());
-  require(states.size() == system.multibody().bodies.size(), "one state per body is needed");
   VectorXd y = e.pack(states);
   // Rows that depend on others at one configuration need not do so at the next.
   for (int round = 0; round < 3; ++round) {

@@ -3,7 +3,7 @@
 #include "dynamics/events/contacts.hpp"
 #include "dynamics/model/energy_ledger.hpp"
 #include "dynamics/model/multibody.hpp"
-#include "dynamics/relative/tree.hpp"
+#include "dynamics/numerics/ida.hpp"
 
 #include <Eigen/Core>
 
@@ -55,12 +55,10 @@ struct MultipliersOptions : FlightOptions {
   std::vector<double> angles{};     // per joint: a hinge starts at the turn nearest to this [rad]; empty: to its rest
   double dissipated = 0, work = 0;  // before the start [J]; dissipated: by structures and springs, or everything
   std::vector<std::vector<double>> lost{};  // before the start, as of MultibodyState; empty: nothing
-  std::string linear_solver = "klu";        // or "dense"
 };
 
-struct MultipliersSummary {
-  long steps = 0, residual_evaluations = 0, factorisations = 0, newton_iterations = 0, error_test_failures = 0,
-       convergence_failures = 0, restarts = 0;
+struct MultipliersSummary : DaeCounts {
+  long restarts = 0;
   double seconds = 0;
   double position_drift = 0;           // largest violation of a constraint at any step [m]
   double angle_drift = 0;              // [rad]
@@ -78,7 +76,7 @@ struct MultipliersSummary {
 struct MultibodyTrajectory {
   std::vector<double> time;
   std::vector<MultibodyState> states;
-  std::vector<Balance> balance;  // momenta with the wheels'; elastic with springs and gravity's potential
+  std::vector<Balance> balance;  // momenta with the wheels'
   std::vector<StopEvent> events;
   MultipliersSummary summary;
 };

@@ -15,24 +15,16 @@ using Eigen::VectorXd;
 using spatial::eigen;
 using spatial::vec3;
 
-void PatternSum::finish(int size, bool dense) {
+void PatternSum::finish(int size) {
   recording_ = false;
-  count_ = places_.size();
-  slots_.resize(count_);
-  if (dense) {
-    for (size_t i = 0; i < count_; ++i)
-      slots_[i] =
-          static_cast<size_t>(places_[i].second) * static_cast<size_t>(size) + static_cast<size_t>(places_[i].first);
-    rows_.assign(static_cast<size_t>(size) * static_cast<size_t>(size), 0);
-    return;
-  }
-  std::vector<size_t> order(count_);
+  slots_.resize(places_.size());
+  std::vector<size_t> order(places_.size());
   std::iota(order.begin(), order.end(), size_t{0});
   std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
     return std::pair(places_[a].second, places_[a].first) < std::pair(places_[b].second, places_[b].first);
   });
   starts_.assign(static_cast<size_t>(size) + 1, 0);
-  for (size_t k = 0; k < count_; ++k) {
+  for (size_t k = 0; k < order.size(); ++k) {
     const auto& [row, column] = places_[order[k]];
     if (k == 0 || places_[order[k - 1]] != places_[order[k]]) {
       rows_.push_back(row);

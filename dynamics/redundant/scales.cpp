@@ -1,5 +1,6 @@
 #include "dynamics/redundant/scales.hpp"
 
+#include "dynamics/events/conservation.hpp"
 #include "dynamics/numerics/rotation.hpp"
 
 #include <algorithm>
@@ -16,7 +17,9 @@ namespace {
 /// What a start says of the energies to come: its own; where it has none, what its pushes begin with; where nothing
 /// pushes yet but round-off, that of slow bodies. `time`: in which a push shows [s].
 double energy_scale(const Equations& equations, double at_start, const VectorXd& y_dot, double time) {
-  const double slow = slow_energy(equations.scene());
+  double inertia = 0;
+  for (const ReducedBody& b : equations.scene().bodies) inertia += b.J0.trace();
+  const double slow = slow_energy(inertia);
   if (at_start > nothing * slow) return at_start;
   double begun = 0;
   for (size_t i = 0; i < equations.places().size(); ++i) {
@@ -31,12 +34,6 @@ double energy_scale(const Equations& equations, double at_start, const VectorXd&
 }
 
 }  // namespace
-
-double slow_energy(const Multibody& scene) {
-  double E = 0;
-  for (const ReducedBody& b : scene.bodies) E += 0.5e-4 * b.J0.trace();
-  return E;
-}
 
 StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorXd& y0_dot, double energy,
                          double tolerance, double duration)

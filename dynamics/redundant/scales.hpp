@@ -6,12 +6,6 @@
 
 namespace flexboom::redundant {
 
-/// Energy of bodies that go a hundredth of their size per second [J].
-double slow_energy(const Multibody&);
-
-/// The share of it that is round-off: nothing moves.
-constexpr double nothing = 1e-20;
-
 /// Sizes that errors of the redundant unknowns are weighed against: the largest value so far of the group it belongs to
 /// (displacement from the start for R, half the angle turned for p), and at least a small part of what the energy or
 /// the accelerations at the start could make of it. Multipliers are not weighed.

@@ -4,7 +4,6 @@
 #include "fem/base/check.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace flexboom {
 
@@ -100,9 +99,7 @@ PlaceMotionInSpace in_space(const tree::Model& model, const Place& place, const 
                             tree::Scratch<double>& scratch) {
   const tree::PlacedOn on = tree::packed_place(model, place, "place");
   const auto found = tree::find_place(model, on, y.data(), scratch, scratch.U);
-  PlaceMotionInSpace m{eigen(found.position), eigen(found.velocity), eigen(found.omega), {}};
-  for (int i = 0; i < 3; ++i) m.axes.row(i) = eigen(found.axes.row[static_cast<size_t>(i)]).transpose();
-  return m;
+  return {eigen(found.position), eigen(found.velocity), eigen(found.omega), eigen(found.axes)};
 }
 
 /// What the joint of a link exerts on place b, after the accelerations.

@@ -8,7 +8,6 @@
 #include "dynamics/numerics/spatial.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 #include <vector>
 

@@ -6,7 +6,6 @@
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
-#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
@@ -17,30 +16,16 @@ using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
+using spatial::eigen;
+using spatial::mat3;
 using spatial::vec3;
 
 namespace {
-
-Mat3<double> mat3(const Matrix3d& m) {
-  return {{vec3(m.row(0).transpose()), vec3(m.row(1).transpose()), vec3(m.row(2).transpose())}};
-}
-
-Matrix3d eigen(const Mat3<double>& m) {
-  Matrix3d r;
-  for (int i = 0; i < 3; ++i) r.row(i) = spatial::eigen(m.row[static_cast<size_t>(i)]).transpose();
-  return r;
-}
 
 std::vector<Vec3<double>> columns(const Matrix3Xd& m) {
   std::vector<Vec3<double>> r;
   for (Eigen::Index k = 0; k < m.cols(); ++k) r.push_back(vec3(m.col(k)));
   return r;
-}
-
-/// Where a place is in the undeformed BRF.
-Vector3d position_of(const Multibody& scene, const Place& place) {
-  return place.marker.empty() ? place.position
-                              : marker(scene.bodies[static_cast<size_t>(place.body)], place.marker).position;
 }
 
 /// Does a marker's motion exceed round-off? Against the motion that mass and shape of the body speak of.

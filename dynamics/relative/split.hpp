@@ -6,6 +6,7 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace flexboom {
@@ -60,7 +61,7 @@ class SplitProblem {
   /// contact: one flag per stop.
   virtual void derivative(double t, const double* y, std::span<const char> contact, double* y_dot) = 0;
   /// The acceleration of a root's mass centre, at the state of the last `derivative` [m/s^2].
-  virtual Eigen::Vector3d outside_acceleration(size_t root, double t, const double* y) = 0;
+  virtual Eigen::Vector3d outside_acceleration(size_t root) = 0;
   /// d(x')/dx.
   virtual Eigen::MatrixXd linear(double t, const double* y, std::span<const char> contact) = 0;
   /// By x and attitudes alone. t: of prescribed motions [s].
@@ -69,6 +70,9 @@ class SplitProblem {
   virtual MassCentre mass_centre(size_t root, double t, const double* y) = 0;
 };
 
+/// Why a tree cannot be split: words, or none.
+std::string split_fault(const Tree&);
+/// @throws InputError where there is such a reason.
 std::unique_ptr<SplitProblem> split(const Tree&);
 
 }  // namespace flexboom

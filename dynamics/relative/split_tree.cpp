@@ -39,10 +39,6 @@ SplitLayout layout_of(const Tree& tree) {
     if (type.turns) r.turns.push_back({link.omega, link.attitude, type.floats});
     if (type.floats) r.roots.push_back({link.position, link.velocity, link.attitude, link.omega});
     spherical = spherical || (type.turns && !type.floats);
-    require(!type.floats || link.parent < 0,
-            fmt::format("integrator: exponential collocation has no free joint between two bodies, as joint {}; adams "
-                        "or bdf do",
-                        tree.scene().joints[static_cast<size_t>(link.joint)].name));
   }
   for (const int joint : tree.stops()) {
     const int gap = l.joints[static_cast<size_t>(joint)].scalar;
@@ -79,7 +75,7 @@ class SplitTree final : public SplitProblem {
     tree_.derivative(t, y, of_joints(contact), *work_, y_dot);
   }
 
-  Vector3d outside_acceleration(size_t root, double, const double*) override {
+  Vector3d outside_acceleration(size_t root) override {
     tree::Scratch<double>& scratch = work_->scratch;
     Vector3d force = Vector3d::Zero();
     double m = 0;
@@ -165,6 +161,20 @@ class SplitTree final : public SplitProblem {
 
 }  // namespace
 
-std::unique_ptr<SplitProblem> split(const Tree& tree) { return std::make_unique<SplitTree>(tree); }
+std::string split_fault(const Tree& tree) {
+  if (tree.layout().p + tree.layout().u == 0) return "nothing moves";
+  for (const tree::Link& link : tree.impl().model.links)
+    if (joint_type(link.kind).floats && link.parent >= 0)
+      return fmt::format("joint {} is free, between two bodies",
+                         tree.scene().joints[static_cast<size_t>(link.joint)].name);
+  return "";
+}
+
+std::unique_ptr<SplitProblem> split(const Tree& tree) {
+  const std::string fault = split_fault(tree);
+  require(fault.empty(),
+          fmt::format("integrator: exponential collocation cannot simulate this: {}; adams or bdf can", fault));
+  return std::make_unique<SplitTree>(tree);
+}
 
 }  // namespace flexboom

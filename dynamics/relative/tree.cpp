@@ -11,7 +11,6 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
-#include <cmath>
 
 namespace flexboom {
 
@@ -106,9 +105,7 @@ void check_inertia(const Tree& system, const tree::Model& model) {
     const std::string fault = mass_fault(system.scene(), link, s);
     require(fault.empty(), fault);
     if (link.kind != JointKind::free) continue;
-    const Matrix3d mass = spatial::eigen(s.I.tt), J = spatial::eigen(s.I.ww);
-    Matrix3d c;
-    for (int r = 0; r < 3; ++r) c.row(r) = spatial::eigen(s.I.tw.row[static_cast<size_t>(r)]).transpose();
+    const Matrix3d mass = spatial::eigen(s.I.tt), J = spatial::eigen(s.I.ww), c = spatial::eigen(s.I.tw);
     const Matrix3d left = J - c.transpose() * mass.ldlt().solve(c);
     const double least =
         Eigen::SelfAdjointEigenSolver<Matrix3d>(Matrix3d((left + left.transpose()) / 2)).eigenvalues()(0);
@@ -203,10 +200,20 @@ TreeState Tree::at_rest() const {
 }
 
 VectorXd Tree::pack(const TreeState& s) const {
+  const Multibody& scene = impl_->scene;
+  require(s.joints.size() == scene.joints.size() && s.q.size() == scene.bodies.size() &&
+              s.q_dot.size() == scene.bodies.size() && s.spin.size() == scene.wheels.size(),
+          "the state has not as many joints, bodies and wheels as the scene");
   VectorXd y = VectorXd::Zero(impl_->layout.size);
   for (const tree::Link& link : impl_->model.links) {
     const JointState& joint = s.joints[static_cast<size_t>(link.joint)];
     const JointType& type = joint_type(link.kind);
+    const auto scalars = static_cast<size_t>(type.scalars), body = static_cast<size_t>(link.index);
+    require(
+        joint.coordinate.size() == scalars && joint.rate.size() == scalars && s.q[body].size() == link.body.n &&
+            s.q_dot[body].size() == link.body.n,
+        fmt::format("joint {} needs {} coordinates and rates, body {} {} elastic ones",
+                    scene.joints[static_cast<size_t>(link.joint)].name, scalars, scene.bodies[body].name, link.body.n));
     for (int i = 0; i < type.scalars; ++i) {
       y[link.scalar + i] = joint.coordinate[static_cast<size_t>(i)] - link.threshold;
       y[link.rate + i] = joint.rate[static_cast<size_t>(i)];

@@ -8,9 +8,7 @@
 
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 namespace flexboom {
@@ -55,23 +53,6 @@ struct TreeLayout {
 struct PlaceMotionInSpace {
   Eigen::Vector3d position, velocity, omega;  // [m], [m/s], [rad/s]
   Eigen::Matrix3d axes;                       // place -> inertial
-};
-
-/// Energies [J] and momenta (inertial axes; angular about the mass centre).
-struct Balance {
-  double kinetic = 0, elastic = 0, potential = 0;  // potential: of gravity
-  double bodies = 0;                               // of kinetic: neither spin of wheels nor way through space
-  double dissipated = 0, work = 0;                 // since the start
-
-  /// What is kept.
-  double energy() const { return kinetic + elastic + potential + dissipated - work; }
-  /// What can shake the bodies: wheels spin on, whatever their energy.
-  double shaking() const { return std::abs(bodies) + std::abs(elastic); }
-  std::vector<double> dissipated_by_joint;
-  EnergyLedger ledger;  // of elastic and dissipated
-  Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
-  Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();
-  double momentum_scale = 0, angular_momentum_scale = 0;  // sums over the bodies of the norms
 };
 
 /// Size of the geometric stiffness of a body against its Ke in some state. 0 where the body has no Kg.

@@ -49,9 +49,7 @@ PlaceMotionInSpace motion_of(const PlaceData& place, const std::vector<BodyState
     if (place.flexible) elastic = elastic_at(place, s.q.data(), s.q_dot.data());
   }
   const PlaceMotion<double> m = place_motion(place, frame, elastic);
-  PlaceMotionInSpace r{eigen(m.r), eigen(m.r_dot), eigen(m.omega), {}};
-  for (int i = 0; i < 3; ++i) r.axes.row(i) = eigen(m.axes.row[static_cast<size_t>(i)]).transpose();
-  return r;
+  return {eigen(m.r), eigen(m.r_dot), eigen(m.omega), eigen(m.axes)};
 }
 
 /// The two places of a joint.

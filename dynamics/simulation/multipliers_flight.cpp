@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace flexboom {
 
@@ -29,9 +30,10 @@ std::vector<Stop> stops_of(const Equations& equations) {
   const Multibody& scene = equations.scene();
   std::vector<Stop> stops;
   for (size_t i = 0; i < scene.joints.size(); ++i) {
-    const Joint& joint = scene.joints[i];
-    if (equations.joints()[i].stop)
-      stops.push_back(stop_of(joint, i, scene.bodies[static_cast<size_t>(std::max(joint.b.body, 0))]));
+    if (!equations.joints()[i].stop) continue;
+    Joint joint = scene.joints[i];
+    if (joint.b.body < 0) std::swap(joint.a, joint.b);
+    stops.push_back(stop_of(joint, i, scene.bodies[static_cast<size_t>(joint.b.body)]));
   }
   return stops;
 }
@@ -48,7 +50,6 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
         options_(options) {
     const size_t joints = scene_.joints.size();
     memory_ = {std::vector<char>(joints, 0), std::vector<double>(joints, 0.0), {}};
-    check_sizes(start);
     frame_ = std::make_unique<FlightFrame>(equations_, start, t_);
     start_on_constraints(frame_->seen(start));
     begin_contacts();
@@ -63,18 +64,12 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
  private:
   /// For the unknowns as they are numbered.
   void make_method() {
-    if (ida_) add(ida_->counts(), past_);
+    if (ida_) past_ += ida_->counts();
     assembly_ = {};
     if (y_dot_.size() != y_.size()) equations_.make_consistent(t_, y_, y_dot_, memory_);
     record_pattern();
-    ida_ = std::make_unique<Ida>(*this, options_.linear_solver);
+    ida_ = std::make_unique<Ida>(*this);
     renumbered_ = false;
-  }
-
-  static void add(const DaeCounts& c, DaeCounts& to) {
-    to.steps += c.steps, to.residual_evaluations += c.residual_evaluations, to.factorisations += c.factorisations;
-    to.newton_iterations += c.newton_iterations, to.error_test_failures += c.error_test_failures;
-    to.convergence_failures += c.convergence_failures;
   }
 
   int size() const override { return equations_.size(); }
@@ -106,7 +101,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     Consistent at(*this, t, y);
     for (size_t i = 0; i < laws_.switches().size(); ++i) {
       const double side = laws_.sides()[i] ? round_off : -round_off;
-      const double g = laws_.armed()[i] ? switch_gap(laws_.switches()[i], at, y, false).value : 1.0;
+      const double g = laws_.armed()[i] ? switch_value(laws_.switches()[i], at) : 1.0;
       values[contacts_.size() + i] = std::abs(g) <= round_off_of(laws_.switches()[i]) ? side : g;
     }
   }
@@ -133,51 +128,44 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       const int row = flight.equations_.holding(joint);
       return row < 0 ? 0 : y[row];
     }
-    double acceleration(size_t joint) {  // by the change of the rate over a short time
-      constexpr double h = 1e-7;
+    double acceleration(size_t joint) {
       find();
-      const auto rate = [&](double dt) {
-        return flight.equations_.gap(joint, (y + dt * y_dot).eval().data(), flight.memory_.near[joint]).rate;
-      };
-      return (rate(h) - rate(-h)) / (2 * h);
+      return flight.way_acceleration(joint, y, y_dot);
     }
   };
 
-  Gap switch_gap(const LawSwitch& s, Consistent& at, const double* y, bool slopes) {
+  double switch_value(const LawSwitch& s, Consistent& at) {
     const size_t joint = laws_.joint_of(s);
-    const DriveMotion<double> c = equations_.gap(joint, y, memory_.near[joint]);
-    LawPoint p{c.value, c.rate};
+    const Gap way = this->way(joint, at.y.data());
+    LawPoint p{way.value, way.rate};
     if (Laws::needs_hold(s)) p.hold = at.hold(joint);
-    if (slopes && Laws::needs_acceleration(s)) p.acceleration = at.acceleration(joint);
-    return laws_.gap(s, p);
+    return laws_.gap(s, p).value;
   }
 
-  DriveMotion<double> gap(size_t stop, const double* y) {
-    const size_t joint = contacts_.stop(stop).joint;
-    return equations_.gap(joint, y, memory_.near[joint]);
-  }
-  Gap gap(size_t stop) override {
-    const DriveMotion<double> g = gap(stop, y_.data());
-    return {g.value, g.rate};
-  }
-
-  /// By the change of the rate over a short time.
-  Push push(size_t stop, std::span<const char> closed) override {
-    constexpr double h = 1e-7;
-    VectorXd y = y_;
-    JointMemory memory = memory_;
-    set_closed(closed, memory);
-    VectorXd y_dot;
-    equations_.make_consistent(t_, y, y_dot, memory);
-    const double before = gap(stop, (y - h * y_dot).eval().data()).rate,
-                 after = gap(stop, (y + h * y_dot).eval().data()).rate;
-    return {(after - before) / (2 * h), 0};
-  }
-
-  Gap joint_way(size_t joint) override {
-    const DriveMotion<double> c = equations_.gap(joint, y_.data(), memory_.near[joint]);
+  /// Of a joint.
+  Gap way(size_t joint, const double* y) {
+    const DriveMotion<double> c = equations_.gap(joint, y, memory_.near[joint]);
     return {c.value, c.rate};
   }
+  /// Of a stop.
+  Gap gap(size_t stop, const double* y) { return way(contacts_.stop(stop).joint, y); }
+  Gap gap(size_t stop) override { return gap(stop, y_.data()); }
+
+  /// By the change of the rate over a short time.
+  double way_acceleration(size_t joint, const VectorXd& y, const VectorXd& y_dot) {
+    constexpr double h = 1e-7;
+    return (way(joint, (y + h * y_dot).eval().data()).rate - way(joint, (y - h * y_dot).eval().data()).rate) / (2 * h);
+  }
+
+  Push push(size_t stop, std::span<const char> closed) override {
+    VectorXd y = y_, y_dot;
+    JointMemory memory = memory_;
+    set_closed(closed, memory);
+    equations_.make_consistent(t_, y, y_dot, memory);
+    return {way_acceleration(contacts_.stop(stop).joint, y, y_dot), 0};
+  }
+
+  Gap joint_way(size_t joint) override { return way(joint, y_.data()); }
   double joint_acceleration(size_t joint) override { return Consistent(*this, t_, y_.data()).acceleration(joint); }
   double hold_load(size_t joint) override { return Consistent(*this, t_, y_.data()).hold(joint); }
   void lose(size_t joint, LawLoss loss, double energy) override {
@@ -228,8 +216,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     }
   }
   double rate_of_blow(size_t joint) override {  // rates are linear in the velocities
-    const VectorXd after = y_ + blow_;
-    return equations_.gap(joint, after.data(), memory_.near[joint]).rate - joint_way(joint).rate;
+    return way(joint, (y_ + blow_).eval().data()).rate - joint_way(joint).rate;
   }
   double hold_of_blow(size_t joint) override {
     const int row = equations_.holding(joint);
@@ -244,16 +231,6 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
 
   void set_closed(std::span<const char> closed, JointMemory& memory) const {
     for (size_t i = 0; i < contacts_.size(); ++i) memory.closed[contacts_.stop(i).joint] = closed[i];
-  }
-
-  void check_sizes(const std::vector<BodyState>& start) const {
-    require(start.size() == scene_.bodies.size(),
-            fmt::format("{} bodies need as many states, {} were given", scene_.bodies.size(), start.size()));
-    for (size_t i = 0; i < start.size(); ++i)
-      for (const VectorXd* q : {&start[i].q, &start[i].q_dot})
-        require(q->size() == 0 || q->size() == scene_.bodies[i].n(),
-                fmt::format("body \"{}\" has {} elastic coordinates, {} were given", scene_.bodies[i].name,
-                            scene_.bodies[i].n(), q->size()));
   }
 
   void start_on_constraints(const std::vector<BodyState>& start) {
@@ -304,13 +281,12 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
 
   void follow_turns() {
     for (size_t i = 0; i < scene_.joints.size(); ++i)
-      if (scene_.joints[i].kind == JointKind::hinge)
-        memory_.near[i] = equations_.gap(i, y_.data(), memory_.near[i]).value;
+      if (scene_.joints[i].kind == JointKind::hinge) memory_.near[i] = way(i, y_.data()).value;
   }
 
   void record_pattern() {
     equations_.newton(t_, 1, y_.data(), y_dot_.data(), memory_, assembly_);
-    assembly_.finish(size(), options_.linear_solver == "dense");
+    assembly_.finish(size());
   }
 
   void restart() override {
@@ -381,7 +357,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
 
   Clearance clearance(size_t i, const VectorXd& y) {
     const double side = contacts_.closed()[i] ? 1 : -1;
-    const DriveMotion<double> g = gap(i, y.data());
+    const Gap g = gap(i, y.data());
     return {0, side * (g.value - levels_[i]), side * g.rate};
   }
 
@@ -389,8 +365,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   Clearance switch_clearance(size_t i, const VectorXd& y) {
     const LawSwitch& s = laws_.switches()[i];
     if (!laws_.armed()[i] || Laws::needs_hold(s) || Laws::needs_acceleration(s)) return {0, 1, 0};
-    Consistent unused(*this, 0, y.data());
-    const Gap g = switch_gap(s, unused, y.data(), false);
+    const Gap way = this->way(laws_.joint_of(s), y.data()), g = laws_.gap(s, {way.value, way.rate});
     const double side = laws_.sides()[i] ? 1 : -1;
     return {0, side * g.value, side * g.rate};
   }
@@ -398,25 +373,23 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   /// IDA looks at the signs at both ends of a step: a contact that begins and ends within it is found here.
   void find_short_contacts(double t0, double& t, VectorXd& y) {
     const double length = t - t0;
-    double first = length;
+    double first = 1;  // share of the step
     for (size_t i = 0; i < before_.size(); ++i) {
       const bool of_law = i >= contacts_.size();
       const size_t k = of_law ? i - contacts_.size() : i;
-      const auto clear = [&](const VectorXd& state) {
-        return of_law ? switch_clearance(k, state) : clearance(k, state);
+      const auto clear = [&](double c, const VectorXd& state) {
+        const Clearance here = of_law ? switch_clearance(k, state) : clearance(k, state);
+        return Clearance{c, here.value, here.slope * length};
       };
       if (!(of_law ? laws_.armed()[k] != 0 : std::isfinite(levels_[k])) || !(before_[i].slope < 0)) continue;
-      Clearance to = clear(y);
-      to.c = length;
+      const Clearance from{0, before_[i].value, before_[i].slope * length}, to = clear(1, y);
       if (!(to.slope > 0) || to.value < 0) continue;
       const auto at = [&](double c) {
         sample_.resize(size());
-        ida_->interpolate(t0 + c, sample_);
-        Clearance here = clear(sample_);
-        here.c = c;
-        return here;
+        ida_->interpolate(t0 + c * length, sample_);
+        return clear(c, sample_);
       };
-      const double root = crossing_between(at, before_[i], to, 4e-16 * t);
+      const double root = crossing_between(at, from, to, 4e-16 * t / length);
       // At round-off of the gap it may be no crossing to those who look at the rate: then the step ends where it ended,
       // for the next one starts there.
       if (root >= first || !(at(root).slope < 0)) continue;
@@ -424,9 +397,9 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       crossed_[i] = (of_law ? laws_.sides()[k] : contacts_.closed()[k]) ? -1 : 1;
       first = root;
     }
-    if (first == length) return;
+    if (first == 1) return;
     std::copy_n(crossed_.begin(), contacts_.size(), contacts_.crossed().begin());
-    t = t0 + first;
+    t = t0 + first * length;
     ida_->interpolate(t, y);
   }
 
@@ -455,8 +428,8 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       s.accelerations.push_back({y_dot.segment<3>(at.v), y_dot.segment<3>(at.w)});
     for (size_t i = 0; i < scene_.joints.size(); ++i) {
       const JointKind kind = scene_.joints[i].kind;
-      DriveMotion<double> c;
-      if (kind == JointKind::hinge || kind == JointKind::slider) c = equations_.gap(i, y.data(), memory_.near[i]);
+      Gap c;
+      if (kind == JointKind::hinge || kind == JointKind::slider) c = way(i, y.data());
       s.coordinate.push_back(c.value + scene_.joints[i].mechanism.threshold);
       s.rate.push_back(c.rate);
     }
@@ -465,8 +438,6 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       const ReactionWheel& w = scene_.wheels[i];
       s.spin.push_back(y[equations_.wheel(i)] / w.inertia - w.axis.dot(s.bodies[static_cast<size_t>(w.body)].omega));
     }
-    s.ledger = equations_.ledger(y.data(), memory_);
-    s.work = y[equations_.work()], s.dissipated = s.ledger.lost();
     s.lost.resize(scene_.joints.size());
     for (size_t i = 0; i < scene_.joints.size(); ++i)
       if (const int first = equations_.losses(i); first >= 0)
@@ -474,6 +445,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     s.laws = memory_.laws;
     Balance balance = balance_of(equations_, y, memory_);
     frame_->leave(t, s, balance);
+    s.ledger = balance.ledger, s.work = balance.work, s.dissipated = balance.dissipated;
     result_.time.push_back(t);
     result_.states.push_back(std::move(s));
     result_.balance.push_back(balance);
@@ -481,11 +453,8 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
 
   void finish() override {
     MultipliersSummary& s = result_.summary;
-    DaeCounts c = past_;
-    add(ida_->counts(), c);
-    s.steps = c.steps, s.residual_evaluations = c.residual_evaluations, s.factorisations = c.factorisations;
-    s.newton_iterations = c.newton_iterations, s.error_test_failures = c.error_test_failures;
-    s.convergence_failures = c.convergence_failures;
+    static_cast<DaeCounts&>(s) = past_;
+    s += ida_->counts();
     set_drifts(scene_, options_.largest, result_);
   }
 

@@ -190,7 +190,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     std::copy(crossed_.begin(), crossed_.begin() + stops, contacts_.crossed().begin());
     std::copy(crossed_.begin() + stops, crossed_.end(), laws_.crossed().begin());
   }
-  void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override { stepper_->interpolate_all(times, Y); }
+  void interpolate(std::span<const double> times, Eigen::MatrixXd& Y) override { stepper_->interpolate(times, Y); }
   void observe(const VectorXd& y) override {
     scales_.observe(y);
     for (const TreeLayout::Joint& j : tree_.layout().joints)
@@ -229,15 +229,10 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   }
 
   void finish() override {
-    constexpr double digits = 1e-12;  // what is left of a potential energy that hardly changes
     IntegrationSummary& s = result_.summary;
-    add_counts(stepper_->counts(), s);
+    static_cast<StepCounts&>(s) = stepper_->counts();
     Conservation kept(tree_.scene().bodies, options_.largest);
-    for (const Balance& b : result_.balance)
-      kept.add(
-          b.energy(),
-          std::max({b.kinetic + std::abs(b.elastic), std::abs(b.work), b.dissipated, digits * std::abs(b.potential)}),
-          b);
+    for (const Balance& b : result_.balance) kept.add(b);
     s.largest = kept.largest();
     s.energy_balance = kept.energy_balance();
     if (is_isolated(tree_.scene())) s.momentum_drift = kept.momentum_drift();
@@ -345,6 +340,8 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
     }
   };
   if (has_laws) return fly_by_others("joints have laws");
+  if (const std::string fault = split_fault(tree); !fault.empty())
+    return fly_by_others("exponential collocation cannot: " + fault);
   try {
     Pilot pilot(tree, o.duration - o.start);
     TreeTrajectory r = flown("exponential", &pilot);
@@ -354,8 +351,6 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
     return fly("erk", reason.why);
   } catch (const MethodFailure& failure) {
     return fly("bdf", fmt::format("exponential collocation could not: {}", failure.what()));
-  } catch (const InputError& failure) {
-    return fly_by_others(fmt::format("exponential collocation cannot: {}", failure.what()));
   }
 }
 

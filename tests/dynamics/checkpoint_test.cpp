@@ -1,5 +1,6 @@
 // What is told of a flight on its way, and where it fails; and motions that die out before they reach a stop.
 
+#include "dynamics/model/time_function.hpp"
 #include "dynamics/simulation/formulations.hpp"
 #include "dynamics/simulation/tree_integrator.hpp"
 #include "fem/base/check.hpp"
@@ -211,6 +212,47 @@ TEST_P(EveryEngine, AMotionThatDiesOutBeforeTheStopMakesNoContact) {
     EXPECT_EQ(r.contacts.size(), 0u) << "damping " << c.damping << ", modes " << c.modes;
     EXPECT_LT(std::abs(r.gap.back()), c.tolerance);
   }
+}
+
+/// A body that a torque turns, whose table ends on the way.
+TEST(CheckpointOfATree, OutlivesAFunctionOfTimeThatEnds) {
+  Multibody scene;
+  scene.bodies = {rigid_body("bar", 1, Vector3d::Zero(), Vector3d(1, 1, 1).asDiagonal())};
+  Joint joint;
+  joint.name = "pivot", joint.a.body = -1, joint.b.body = 0, joint.mechanism = {0, 0, 0, 0, 0};
+  scene.joints = {joint};
+  Load load;
+  load.name = "motor", load.at.body = 0;
+  load.torque[2] = time_table({{0, 0.5}, {1, 1}, "linear", "error"}).function.value;
+  scene.loads = {load};
+  const Tree tree(scene);
+  IntegratorOptions o;
+  o.duration = 1, o.output_step = 0.01;
+  for (const char* method : {"auto", "adams", "exponential"}) {
+    o.method = method;
+    int told = 0;
+    size_t rows = 0;
+    const auto look = [&](const TreeTrajectory& r, size_t) { ++told, rows = r.time.size(); };
+    EXPECT_THROW(integrate(tree, tree.pack(tree.at_rest()), o, look), InputError) << method;
+    EXPECT_GT(rows, 10U) << method;
+    EXPECT_LE(told, 3) << method << ": it is not tried twice";
+  }
+}
+
+// Then any method has no work; exponential collocation says so.
+TEST(Integrate, WhereNothingMoves) {
+  Multibody scene;
+  scene.bodies = {rigid_body("block", 1, Vector3d::Zero(), Vector3d(1, 1, 1).asDiagonal())};
+  Joint joint;
+  joint.name = "weld", joint.kind = JointKind::fixed, joint.a.body = -1, joint.b.body = 0;
+  joint.mechanism = {0, 0, 0, 0, 0};
+  scene.joints = {joint};
+  const Tree tree(scene);
+  IntegratorOptions o;
+  o.duration = 1, o.output_step = 0.1;
+  EXPECT_EQ(integrate(tree, tree.pack(tree.at_rest()), o).time.size(), 11U);
+  o.method = "exponential";
+  EXPECT_THROW(integrate(tree, tree.pack(tree.at_rest()), o), InputError);
 }
 
 }  // namespace

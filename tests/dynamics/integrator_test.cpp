@@ -83,9 +83,7 @@ class UnfitSplit final : public SplitProblem {
     unfit_.look(t);
     problem_->derivative(t, y, contact, y_dot);
   }
-  Vector3d outside_acceleration(size_t root, double t, const double* y) override {
-    return problem_->outside_acceleration(root, t, y);
-  }
+  Vector3d outside_acceleration(size_t root) override { return problem_->outside_acceleration(root); }
   Eigen::MatrixXd linear(double t, const double* y, std::span<const char> contact) override {
     return problem_->linear(t, y, contact);
   }

@@ -37,6 +37,36 @@ void expect_balanced(const LawFlight& f) {
   for (const double e : f.energy) EXPECT_NEAR(e, f.energy.front(), digits * scale);
 }
 
+// What a run left goes on only under a law that can be in that state.
+TEST(LawModel, FitsStatesOfItsOwn) {
+  using Motion = LawState::Motion;
+  const auto model = [](const JointLaw& law) {
+    Joint joint;
+    joint.mechanism = {1, 0, 0, 0, 0}, joint.law = law;
+    return LawModel(joint);
+  };
+  JointLaw preloaded, rubbing, stopped, latching;
+  preloaded.preload = 1;
+  rubbing.friction = FrictionLaw{1, 1};
+  stopped.upper_stop = StopLaw{.at = 1, .restitution = 0.5};
+  latching.latch = LatchLaw{1, 1};
+  std::vector<LawState> states(7);  // free, slides, sticks, rests at either end, latched, beyond a ramp
+  states[1].motion = Motion::forward;
+  for (size_t i = 2; i < 6; ++i) states[i].motion = Motion::held;
+  states[3].rests_at = 1, states[4].rests_at = -1;
+  states[5].latched = true;
+  states[6].beyond = states[6].pushes = {1};
+  const auto fitting = [&](const JointLaw& law) {
+    std::string which;
+    for (const LawState& s : states) which += model(law).fits(s) ? '1' : '0';
+    return which;
+  };
+  EXPECT_EQ(fitting(preloaded), "1000000");
+  EXPECT_EQ(fitting(rubbing), "0110000");
+  EXPECT_EQ(fitting(stopped), "1001000");
+  EXPECT_EQ(fitting(latching), "1000010");
+}
+
 // Half-cycles about -+ coulomb / k; every one takes pi / omega and 2 coulomb / k of the amplitude.
 TEST_P(Law, CoulombFrictionTakesTheSameFromEveryHalfCycleUntilItSticks) {
   JointLaw law;

@@ -78,7 +78,7 @@ inline LawFlight fly(const Multibody& scene, const TreeState& start, const std::
     TreeState s = tree_state(system, f.states[i]);
     add_state(s, r);
     r.ledger.push_back(f.states[i].ledger);
-    r.energy.push_back(f.balance[i].kinetic + f.balance[i].elastic + f.states[i].dissipated - f.states[i].work);
+    r.energy.push_back(f.balance[i].energy());
   }
   r.time = f.time, r.events = f.events, r.energy_balance = f.summary.energy_balance, r.stops = f.summary.stops;
   return r;

@@ -78,6 +78,20 @@ TEST(MultibodyCheck, BothFormulationsRefuseTheSame) {
       {[](Multibody& s) { s.joints[0].a.marker = "m"; }, "joint shoulder, place a: the inertial frame has no marker"},
       {[](Multibody& s) { s.joints[0].b.body = 7; }, "joint shoulder, place b: there is no body 7"},
       {[](Multibody& s) { s.joints[0].prescribed.resize(2); }, "joint shoulder: motion can be prescribed"},
+      {[](Multibody& s) {
+         const auto zero = [](double) { return 0.0; };
+         s.joints[0].prescribed = {{zero, zero, zero}};
+       },
+       "joint shoulder: it has a stop beside a prescribed motion"},
+      {[](Multibody& s) {
+         s.joints[0].kind = JointKind::spherical, s.joints[0].mechanism = {0, 0, 0, 0, 0};
+         s.joints[0].law.friction = FrictionLaw{1, 1};
+       },
+       "joint shoulder: friction a spherical joint has none"},
+      {[](Multibody& s) {
+         s.joints[0].law.spring = {{0, 1}, {0}};
+       },
+       "joint shoulder: spring has 2 places and 1 loads"},
       {[](Multibody& s) { s.springs[0].free_length = -1; }, "spring tether: stiffness, damping and free length"},
       {[](Multibody& s) { s.springs[0].b.axes(0, 0) = 2; }, "spring tether, place b: the columns of its axes"},
       {[](Multibody& s) { s.loads[0].at.body = -1; }, "load push: it acts on the inertial frame"},

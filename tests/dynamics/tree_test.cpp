@@ -75,7 +75,7 @@ struct TreeCase {
       const JointType& type = joint_type(joint.kind);
       if (prescribed && i > 0)
         for (int k = 0; k < type.scalars; ++k) joint.prescribed.push_back(testing::swing(0.5 + 0.2 * k));
-      if (type.scalars == 1) joint.mechanism = {0.7, 0.2, 0.05, 3.0, 0.3};
+      if (type.scalars == 1) joint.mechanism = {0.7, 0.2, 0.05, joint.prescribed.empty() ? 3.0 : 0.0, 0.3};
       scene.joints.push_back(joint);
       contact.push_back(static_cast<char>(i % 2));
     }
@@ -210,8 +210,7 @@ TEST(Tree, PowerBalances) {
       if (prescribed && type.scalars == 0) continue;
       TreeCase c(JointKind::free, type.kind, Where::marker, Where::marker, prescribed);
       for (const TreeLayout::Joint& j : c.tree->layout().joints)  // within the stops
-        if (j.scalar >= 0 && !prescribed) c.y[j.scalar] = -std::abs(c.y[j.scalar]);
-      if (prescribed) c.t = 3.0;  // the swing is on the free side
+        if (j.scalar >= 0) c.y[j.scalar] = -std::abs(c.y[j.scalar]);
       c.tree->impose(c.t, c.y);
       const auto energy = [&](double t, const VectorXd& y) {
         return Eigen::Matrix<double, 1, 1>(c.tree->balance(t, y).energy());
