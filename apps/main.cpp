@@ -76,7 +76,7 @@ struct CommandLine {
     c->add_option("--plan", run.plan,
                   "Models of the bodies as another run chose them: its results folder or scene.toml")
         ->excludes("--modes");
-    c->add_option("--structure", run.structure, "Model of every body: eq14, beam or rigid");
+    c->add_option("--structure", run.structure, "Model of every body: beam, solid, eq14 or rigid");
     c->add_option("--formulation", run.formulation, "relative or multipliers");
     c->add_option("--integrator", run.integrator, "Integration method");
     c->add_option("--output-step", run.output_step, "Time between rows of trajectory.csv [s]");
@@ -109,7 +109,8 @@ struct CommandLine {
   void add_modes() {
     CLI::App* c = command("modes", "Eigenfrequencies and mode shapes of a body");
     c->add_option("MODEL", modes.model, "Body file (.toml) or mesh (.inp, .msh, .bdf, .vtu, .step, .geo)")->required();
-    c->add_option("--count", modes.count, "Number of modes (default: what the file asks for, or 10)");
+    c->add_option("--count", modes.count, "Number of modes (default: what the file asks for, or 10)")
+        ->check(CLI::Range(1, 1'000'000));
     c->add_option("--backend", modes.backend, "Eigen-solver: auto, arpack, block, spectra or dense");
     c->add_option("--verify", modes.verify, "Proof that no mode is missed: auto (where cheap), sturm, basic")
         ->check(CLI::IsMember({"auto", "sturm", "basic"}));

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace flexboom {
 
@@ -78,6 +79,22 @@ std::vector<size_t> thinned(const std::vector<double>& y, size_t bins) {
 }
 
 }  // namespace
+
+Plot plot_of_points(std::string title, std::string x_label, std::string y_label) {
+  Plot plot;
+  plot.title = std::move(title), plot.x_label = std::move(x_label), plot.y_label = std::move(y_label);
+  plot.log_y = plot.markers = true;
+  plot.height = 330;
+  return plot;
+}
+
+void add_point(Plot& plot, const std::string& name, double x, double y) {
+  if (!std::isfinite(y)) return;
+  auto curve = std::ranges::find(plot.curves, name, &Curve::name);
+  if (curve == plot.curves.end()) curve = plot.curves.insert(curve, Curve{name, {}, {}});
+  curve->x.push_back(x);
+  curve->y.push_back(y);
+}
 
 std::string escaped(const std::string& s) {
   std::string r;

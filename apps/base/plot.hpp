@@ -18,6 +18,12 @@ struct Plot {
   bool markers = false;  // a dot at every value
 };
 
+/// A plot of measured points, its values on a logarithmic scale.
+Plot plot_of_points(std::string title, std::string x_label, std::string y_label);
+
+/// Adds a point to a curve, which is made with its first point. What is not finite is left out.
+void add_point(Plot&, const std::string& curve, double x, double y);
+
 /// Text that can stand between the tags of XML and HTML.
 std::string escaped(const std::string&);
 

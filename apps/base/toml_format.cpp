@@ -17,6 +17,17 @@ bool is_blank(const std::string& text) { return text.find_first_not_of(" \t\r\n"
 
 std::string read_text(const std::string& path) { return file_bytes(path, max_file_size); }
 
+std::string format_of(const std::string& text) {
+  constexpr std::string_view blank = " \t\r\n";
+  size_t at = text.find_first_not_of(blank);
+  while (at != std::string::npos && text[at] == '#') at = text.find_first_not_of(blank, text.find('\n', at));
+  const std::string_view rest = at == std::string::npos ? "" : std::string_view(text).substr(at);
+  const size_t open = rest.find_first_of("\"'\n");
+  if (!rest.starts_with("format") || open == std::string_view::npos || rest[open] == '\n') return "";
+  const size_t close = rest.find(rest[open], open + 1);
+  return std::string(rest.substr(open + 1, close - open - 1));
+}
+
 Value parse_format(const std::string& text, const std::string& file, std::string_view format) {
   require(!is_blank(text),
           fmt::format("{}:1:1: the file is empty; its first key must be format = \"{}\"", file, format));

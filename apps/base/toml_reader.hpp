@@ -19,6 +19,9 @@ namespace flexboom::toml_reader {
 /// The text of a file. @throws InputError when it cannot be read or is larger than any file of ours.
 std::string read_text(const std::string& path);
 
+/// What the first key of a file says that its format is; empty where that is another key, or none.
+std::string format_of(const std::string& text);
+
 /// As parse, of a file whose first key says that it has this format: the faults of another format are not worth
 /// listing.
 Value parse_format(const std::string& text, const std::string& file, std::string_view format);

@@ -49,10 +49,6 @@ class Writer {
     text_ += fmt::format("{} = {}{}{}\n", name, toml(value), *comment ? "  # " : "", comment);
   }
 
-  void raw(std::string_view name, const std::string& value, std::string_view comment = "") {
-    text_ += fmt::format("{} = {}{}{}\n", name, value, comment.empty() ? "" : "  # ", comment);
-  }
-
   std::string text() && { return std::move(text_); }
 
  private:

@@ -1,6 +1,7 @@
 #include "apps/bench/modes.hpp"
 
 #include "fem/base/check.hpp"
+#include "fem/base/files.hpp"
 #include "fem/base/process.hpp"
 #include "fem/booms/solid_boom.hpp"
 #include "fem/formats/abaqus/write.hpp"
@@ -159,13 +160,14 @@ class ModesLadder {
 
  private:
   void write_body_file() {
-    std::ofstream(folder_ / "boom4.toml") << "format = \"flexboom-body-1\"\n"
-                                             "name = \"boom4\"\n"
-                                             "[[segments]]\n"
-                                             "shape = \"round-bar\"\n"
-                                             "diameter = 0.010\n"
-                                             "length = 0.302\n"
-                                             "material = { E = 67e9, nu = 0.33, rho = 2840.0 }\n";
+    write_file(folder_ / "boom4.toml",
+               "format = \"flexboom-body-1\"\n"
+               "name = \"boom4\"\n"
+               "[[segments]]\n"
+               "shape = \"round-bar\"\n"
+               "diameter = 0.010\n"
+               "length = 0.302\n"
+               "material = { E = 67e9, nu = 0.33, rho = 2840.0 }\n");
   }
 
   void add(const ModesBench& row) {

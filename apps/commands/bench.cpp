@@ -7,8 +7,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <map>
-
 namespace flexboom {
 namespace {
 
@@ -45,26 +43,13 @@ std::string csv_of(const std::vector<ModesBench>& rows) {
 }
 
 std::string picture_of(const std::vector<ModesBench>& rows) {
-  Plot plot;
-  plot.title = "Clamped boom 4: largest error of modes 1-10 against time";
-  plot.x_label = "wall time of the whole process, one thread [s]";
-  plot.y_label = "relative error of frequency";
-  plot.log_x = plot.log_y = plot.markers = true;
+  Plot plot = plot_of_points("Clamped boom 4: largest error of modes 1-10 against time",
+                             "wall time of the whole process, one thread [s]", "relative error of frequency");
+  plot.log_x = true;
   plot.height = 440;
-  const auto curve = [&plot](const std::string& name) -> Curve& {
-    for (Curve& c : plot.curves) {
-      if (c.name == name) return c;
-    }
-    return plot.curves.emplace_back(Curve{name, {}, {}});
-  };
   for (const ModesBench& r : rows) {
-    Curve& ours = curve(r.family);
-    ours.x.push_back(r.seconds);
-    ours.y.push_back(r.error);
-    if (r.ccx_seconds <= 0) continue;
-    Curve& theirs = curve(r.family + " CalculiX");
-    theirs.x.push_back(r.ccx_seconds);
-    theirs.y.push_back(r.error);
+    add_point(plot, r.family, r.seconds, r.error);
+    if (r.ccx_seconds > 0) add_point(plot, r.family + " CalculiX", r.ccx_seconds, r.error);
   }
   return svg(plot);
 }

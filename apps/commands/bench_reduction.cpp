@@ -111,27 +111,9 @@ ordered_json json_of(const ReductionBenches& bench) {
 
 // ---- the picture ----
 
-Plot blank_plot(const std::string& title, const std::string& x_label, const std::string& y_label) {
-  Plot plot;
-  plot.title = title;
-  plot.x_label = x_label;
-  plot.y_label = y_label;
-  plot.log_y = plot.markers = true;
-  plot.height = 330;
-  return plot;
-}
-
-void add_point(Plot& plot, const std::string& name, double x, double y) {
-  if (!std::isfinite(y)) return;
-  auto curve = std::ranges::find(plot.curves, name, &Curve::name);
-  if (curve == plot.curves.end()) curve = plot.curves.insert(curve, Curve{name, {}, {}});
-  curve->x.push_back(x);
-  curve->y.push_back(y);
-}
-
 Plot plot_of_time(const std::vector<ReductionBench>& rows) {
-  Plot plot = blank_plot("Reducing the largest solid: time beside its eigen-solve, one thread", "number of modes",
-                         "wall time [s]");
+  Plot plot = plot_of_points("Reducing the largest solid: time beside its eigen-solve, one thread", "number of modes",
+                             "wall time [s]");
   const auto solid = [](const ReductionBench& r) { return r.family.starts_with("beam") ? 0 : r.unknowns; };
   int largest = 0;
   for (const ReductionBench& r : rows) largest = std::max(largest, solid(r));
@@ -145,7 +127,8 @@ Plot plot_of_time(const std::vector<ReductionBench>& rows) {
 }
 
 Plot plot_of_truncation(const std::vector<ReductionBench>& rows) {
-  Plot plot = blank_plot("What the modes lack of the full model (hex, graded)", "number of modes", "relative error");
+  Plot plot =
+      plot_of_points("What the modes lack of the full model (hex, graded)", "number of modes", "relative error");
   std::string finest;
   for (const ReductionBench& r : rows) {
     if (r.family == "hex") finest = r.model;
@@ -160,8 +143,8 @@ Plot plot_of_truncation(const std::vector<ReductionBench>& rows) {
 }
 
 Plot plot_of_invariants(const std::vector<InvariantsBench>& rows) {
-  Plot plot =
-      blank_plot("Invariants of ten modes: largest error of all, consistent and lumped", "unknowns", "relative error");
+  Plot plot = plot_of_points("Invariants of ten modes: largest error of all, consistent and lumped", "unknowns",
+                             "relative error");
   plot.log_x = true;
   for (const InvariantsBench& r : rows) {
     add_point(plot, r.family, r.unknowns, *std::ranges::max_element(r.consistent));

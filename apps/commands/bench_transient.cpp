@@ -77,18 +77,10 @@ std::vector<Plot> plots_of(const std::vector<TransientBench>& rows) {
     if (!r.failure.empty() || !(r.error > 0)) continue;
     const std::string title = fmt::format("{}, {:g} s", r.scene, r.simulated);
     if (plots.empty() || plots.back().title != title) {
-      Plot& plot = plots.emplace_back();
-      plot.title = title;
-      plot.x_label = "time of the integration, one core [s]";
-      plot.y_label = "largest error of all outputs";
-      plot.log_x = plot.log_y = plot.markers = true;
-      plot.height = 330;
+      plots.push_back(plot_of_points(title, "time of the integration, one core [s]", "largest error of all outputs"));
+      plots.back().log_x = true;
     }
-    std::vector<Curve>& curves = plots.back().curves;
-    auto curve = std::ranges::find(curves, r.method, &Curve::name);
-    if (curve == curves.end()) curve = curves.insert(curve, Curve{r.method, {}, {}});
-    curve->x.push_back(r.seconds);
-    curve->y.push_back(r.error);
+    add_point(plots.back(), r.method, r.seconds, r.error);
   }
   return plots;
 }

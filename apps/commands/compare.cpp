@@ -1,13 +1,15 @@
 #include "apps/simulate/compare.hpp"
 #include "apps/base/toml_reader.hpp"
 #include "apps/commands/commands.hpp"
+#include "apps/commands/terminal_line.hpp"
+#include "apps/scene/scene_keys.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <cstdio>
+#include <optional>
 
 namespace flexboom {
 
@@ -16,7 +18,7 @@ using nlohmann::ordered_json;
 bool is_body_file(const std::string& path) {
   std::error_code ignored;  // of the name of a built-in scene
   return std::filesystem::is_regular_file(path, ignored) &&
-         toml_reader::read_text(path).find("\"flexboom-body-1\"") != std::string::npos;
+         toml_reader::format_of(toml_reader::read_text(path)) == scene_keys::body_format;
 }
 
 namespace {
@@ -82,11 +84,11 @@ ordered_json to_json(const std::vector<BodyComparison>& bodies, const std::vecto
 int compare_command(const CompareArguments& a, const CommonOptions& common) {
   std::vector<BodyScene> bodies;
   std::vector<TransientComparison> transients;
+  std::optional<WorkLine> progress(std::in_place, !common.quiet && !common.json, "compare");
   if (is_body_file(a.body)) {
     bodies.push_back(read_body(a.body));
   } else {
     const Scene scene = load_scene(a.body);
-    validate(scene);
     std::string without;
     for (const BodyScene& b : scene.bodies) {
       const std::string why = not_comparable(b);
@@ -101,6 +103,7 @@ int compare_command(const CompareArguments& a, const CommonOptions& common) {
   std::vector<BodyComparison> compared;
   compared.reserve(bodies.size());
   for (const BodyScene& b : bodies) compared.push_back(compare_with_eq14(b, a.count, a.elements));
+  progress.reset();
   // The finest row is judged: the coarser ones show how the error falls.
   const bool passed = std::all_of(compared.begin(), compared.end(),
                                   [&](const BodyComparison& c) { return c.orders.back().largest() <= a.tolerance; });

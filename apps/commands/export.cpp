@@ -1,4 +1,4 @@
-#include "apps/model/reduction.hpp"
+#include "apps/commands/commands.hpp"
 #include "fem/base/check.hpp"
 #include "reduction/body_file/body_file.hpp"
 #include "reduction/exports/exports.hpp"

@@ -1,4 +1,4 @@
-#include "apps/model/reduction.hpp"
+#include "apps/commands/commands.hpp"
 #include "reduction/body_file/body_file.hpp"
 #include "reduction/invariants/certificate.hpp"
 

@@ -1,4 +1,5 @@
 #include "apps/commands/commands.hpp"
+#include "apps/commands/terminal_line.hpp"
 #include "apps/model/bounded_modes.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
@@ -12,7 +13,7 @@
 
 #include <cmath>
 #include <numbers>
-#include <tuple>
+#include <optional>
 #include <utility>
 
 namespace flexboom {
@@ -159,8 +160,8 @@ EigenOptions eigen_options(const ModesArguments& a, const Model& model) {
 }  // namespace
 
 int modes_command(const ModesArguments& a, const CommonOptions& common) {
-  require(!a.count || *a.count > 0, "--count must be positive");
   const Stopwatch clock;
+  std::optional<WorkLine> progress(std::in_place, !common.quiet && !common.json, "modes");
   Model model = load_model(a.model, a.options);
   const double load_seconds = clock.seconds();
   if (!common.quiet) {
@@ -170,6 +171,7 @@ int modes_command(const ModesArguments& a, const CommonOptions& common) {
   BoundedModes m = bounded_modes(std::move(model), options, common.threads);
   m.mesh_seconds += load_seconds;
   if (!a.vtu.empty()) write_vtu(a.vtu, shapes_grid(m));
+  progress.reset();
   if (common.json) {
     fmt::print("{}\n", json_of(m, clock.seconds()).dump(2));
   } else if (!common.quiet) {

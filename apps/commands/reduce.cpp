@@ -1,3 +1,5 @@
+#include "apps/commands/commands.hpp"
+#include "apps/commands/terminal_line.hpp"
 #include "apps/model/richer_bodies.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
@@ -5,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 namespace flexboom {
 
@@ -13,6 +16,7 @@ int reduce_command(const ReduceArguments& a, const CommonOptions& common) {
           fmt::format("-o {}: a reduced body is an HDF5 file, name it .h5; other formats by `flexboom export`",
                       a.file.string()));
   const Stopwatch clock;
+  std::optional<WorkLine> progress(std::in_place, !common.quiet && !common.json, "reduce");
   Model model = load_model(a.model, a.options);
   ReductionSeconds seconds{.mesh = clock.seconds()};
   const ReductionOptions options = reduction_options(a, model);
@@ -22,6 +26,7 @@ int reduce_command(const ReduceArguments& a, const CommonOptions& common) {
   const RicherBodies richer = richer_bodies(loaded, options, body, a.errors, common.threads, model.notes);
   seconds.richer = richer_clock.seconds();
   write_body_file(a.file, body, richer);
+  progress.reset();
   seconds.total = clock.seconds();
   if (common.json) {
     auto document = body_json(body, body.certificate, model.notes);

@@ -1,4 +1,5 @@
 #include "apps/commands/commands.hpp"
+#include "apps/commands/terminal_line.hpp"
 #include "apps/results/report.hpp"
 #include "apps/results/results_folder.hpp"
 #include "dynamics/methods/integrator.hpp"
@@ -6,17 +7,14 @@
 #include "fem/base/files.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <csignal>
-#include <cstdio>
 #include <sstream>
 
 namespace flexboom {
@@ -52,45 +50,32 @@ class InterruptGuard {
   std::array<struct sigaction, signals.size()> before_ = {};
 };
 
-/// One line on a terminal: percent, simulated / wall time, time left of a flight. A plan and an error budget take many
-/// flights; nobody knows how many. Silent for work under a second and where stderr is no terminal.
-class ProgressLine {
+/// Percent, simulated and wall time, and time left of one integration. A plan and an error budget take many; nobody
+/// knows how many.
+class RunProgress {
  public:
-  explicit ProgressLine(bool wanted) : wanted_(wanted && isatty(STDERR_FILENO) == 1) {}
-  ~ProgressLine() {
-    if (shown_) std::fputs(fmt::format("\r{:79}\r", "").c_str(), stderr);
-  }
-  ProgressLine(const ProgressLine&) = delete;
-  ProgressLine& operator=(const ProgressLine&) = delete;
+  explicit RunProgress(bool wanted) : line_(wanted) {}
 
   void operator()(double time, double duration) {
-    if (!wanted_) return;
-    using seconds = std::chrono::duration<double>;
-    const auto now = std::chrono::steady_clock::now();
     if (time < time_ || flights_ == 0) {
       ++flights_;
-      start_of_flight_ = now, first_ = time;
+      start_ = line_.seconds(), first_ = time;
     }
     time_ = time;
-    if (time == first_ || now - start_ < std::chrono::seconds(1) || now - shown_at_ < std::chrono::milliseconds(200))
-      return;
-    shown_at_ = now;
-    shown_ = true;
-    const double wall = seconds(now - start_of_flight_).count();
-    std::string line =
+    if (time == first_ || !line_.is_due()) return;
+    const double wall = line_.seconds() - start_;
+    std::string text =
         fmt::format("{:.0f} %  {:.3g} of {:.3g} s simulated in {:.1f} s, {:.3g} s left", 100 * time / duration, time,
                     duration, wall, wall * (duration - time) / (time - first_));
-    if (flights_ > 1) line = fmt::format("flight {} ({:.0f} s):  {}", flights_, seconds(now - start_).count(), line);
-    std::fputs(fmt::format("\r{:79.79}", line).c_str(), stderr);
-    std::fflush(stderr);
+    if (flights_ > 1) text = fmt::format("flight {} ({:.0f} s):  {}", flights_, line_.seconds(), text);
+    line_.show(text);
   }
 
  private:
-  using Time = std::chrono::steady_clock::time_point;
-  bool wanted_, shown_ = false;
+  TerminalLine line_;
   int flights_ = 0;
   double first_ = 0, time_ = 0;  // simulated, of the first call of this flight and of the last one [s]
-  Time start_ = std::chrono::steady_clock::now(), start_of_flight_ = start_, shown_at_ = start_;
+  double start_ = 0;             // of this flight [s]
 };
 
 void override_modes(Scene& scene, const std::string& text) {
@@ -145,11 +130,14 @@ void take_digits(Scene& scene, const std::filesystem::path& folder) {
 
 /// The scene begins with a saved state, whose modes and static shapes replace those of the scene unless they are asked
 /// for.
-void go_on(Scene& scene, const RunArguments& a) {
+void go_on(Scene& scene, const RunArguments& a, bool quiet) {
   const std::filesystem::path& from = a.from;
-  if (never_flew(from))
-    return print_note(
-        fmt::format("--continue: the run in {} ended before its motion began; this one begins at 0 s", from.string()));
+  if (never_flew(from)) {
+    if (!quiet)
+      print_note(fmt::format("--continue: the run in {} ended before its motion began; this one begins at 0 s",
+                             from.string()));
+    return;
+  }
   auto saved = std::make_shared<const SavedState>(SavedState::read(from, a.force));
   require(saved->time() < scene.duration,
           fmt::format("--continue: {} is of t = {:g} s, the run ends at {:g} s; --duration is the time at the end",
@@ -169,7 +157,7 @@ void go_on(Scene& scene, const RunArguments& a) {
   scene.from = std::move(saved);
 }
 
-Scene scene_of(const RunArguments& a) {
+Scene scene_of(const RunArguments& a, bool quiet) {
   Scene scene = load_scene(a.scene);
   const std::filesystem::path file = a.scene;
   scene.bodies_kept_in = builtin_scene(a.scene) != nullptr ? std::filesystem::path("results") / "bodies"
@@ -188,7 +176,7 @@ Scene scene_of(const RunArguments& a) {
   if (a.no_budget) scene.error_budget = false;
   scene.verify = a.verify;
   if (a.loads) ask_for_loads(scene);
-  if (!a.from.empty()) go_on(scene, a);
+  if (!a.from.empty()) go_on(scene, a, quiet);
   validate(scene);
   return scene;
 }
@@ -227,7 +215,7 @@ void print_summary(const RunResult& r, const std::filesystem::path& folder) {
 
 /// The line is gone again before anything else is printed.
 RunResult run_with_progress(const Scene& scene, bool wanted, double checkpoint_every, ResultsFolder& results) {
-  ProgressLine progress(wanted);
+  RunProgress progress(wanted);
   return run_scene(scene, {&interrupted, [&progress](double t, double T) { progress(t, T); }, checkpoint_every},
                    [&results](const RunResult& so_far, size_t first) { results.add(so_far, first); });
 }
@@ -272,7 +260,6 @@ nlohmann::ordered_json checked(const std::string& name) {
   if (is_body_file(name))
     return {{"body", read_body(name).name}, {"warnings", nlohmann::ordered_json::array()}, {"ok", true}};
   const Scene scene = load_scene(name);
-  validate(scene);
   const bool certified = std::ranges::all_of(scene.bodies, [](const BodyScene& b) {
     return !b.reduced || std::ranges::all_of(b.reduced->certificate, &BodyCheck::passed);
   });
@@ -284,7 +271,7 @@ nlohmann::ordered_json checked(const std::string& name) {
 
 int run_command(const RunArguments& a, const CommonOptions& common) {
   require(!std::isnan(a.checkpoint), "--checkpoint: is not a number of seconds");
-  const Scene scene = scene_of(a);
+  const Scene scene = scene_of(a, common.quiet);
   const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results") / scene.name : common.out;
   ResultsFolder results(folder, scene, builtin_scene(a.scene) ? "" : a.scene);
   const InterruptGuard guard;

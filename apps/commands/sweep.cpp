@@ -1,15 +1,13 @@
 #include "apps/sweep/sweep.hpp"
 #include "apps/commands/commands.hpp"
+#include "apps/commands/terminal_line.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
 #include <sched.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
-#include <chrono>
-#include <cstdio>
 
 namespace flexboom {
 
@@ -36,37 +34,23 @@ Shard shard_of(const std::string& text) {
   return shard;
 }
 
-/// Runs done and time left, on a terminal, for work over a second.
-class SweepProgressLine {
+/// Runs done and time left.
+class SweepProgress {
  public:
-  explicit SweepProgressLine(bool wanted) : wanted_(wanted && isatty(STDERR_FILENO) == 1) {}
-  ~SweepProgressLine() {
-    if (shown_) std::fputs(fmt::format("\r{:79}\r", "").c_str(), stderr);
-  }
-  SweepProgressLine(const SweepProgressLine&) = delete;
-  SweepProgressLine& operator=(const SweepProgressLine&) = delete;
+  explicit SweepProgress(bool wanted) : line_(wanted) {}
 
   void operator()(size_t done, size_t of) {
-    if (!wanted_) return;
-    const auto now = std::chrono::steady_clock::now();
     if (told_++ == 0) before_ = done - 1;
-    const double wall = std::chrono::duration<double>(now - start_).count();
-    if (wall < 1 || now - last_ < std::chrono::milliseconds(200)) return;
-    last_ = now;
-    shown_ = true;
-    const double rate = static_cast<double>(done - before_) / wall;
-    std::fputs(fmt::format("\r{:79}", fmt::format("{:.0f} %  {} of {} runs, {:.3g} runs/s, {:.0f} s left",
-                                                  100.0 * static_cast<double>(done) / static_cast<double>(of), done, of,
-                                                  rate, static_cast<double>(of - done) / rate))
-                   .c_str(),
-               stderr);
-    std::fflush(stderr);
+    if (!line_.is_due()) return;
+    const double rate = static_cast<double>(done - before_) / line_.seconds();
+    line_.show(fmt::format("{:.0f} %  {} of {} runs, {:.3g} runs/s, {:.0f} s left",
+                           100.0 * static_cast<double>(done) / static_cast<double>(of), done, of, rate,
+                           static_cast<double>(of - done) / rate));
   }
 
  private:
-  bool wanted_, shown_ = false;
+  TerminalLine line_;
   size_t told_ = 0, before_ = 0;  // done by an earlier process
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_ = start_;
 };
 
 SweepRequest request_of(const SweepArguments& a, const CommonOptions& common) {
@@ -98,7 +82,7 @@ void print_sweep(const SweepEnd& end, const std::filesystem::path& folder) {
 }
 
 SweepEnd swept(const SweepRequest& r, bool progress_wanted) {
-  SweepProgressLine progress(progress_wanted);
+  SweepProgress progress(progress_wanted);
   return run_sweep(r, [&progress](size_t done, size_t of) { progress(done, of); });
 }
 

@@ -2,11 +2,10 @@
 
 #include "apps/model/prepared_body.hpp"
 #include "fem/base/check.hpp"
+#include "fem/base/text_reader.hpp"
 #include "fem/formats/mesh_formats.hpp"
 
 #include <fmt/format.h>
-
-#include <cstdio>
 
 namespace flexboom {
 namespace {
@@ -69,10 +68,9 @@ Model file_model(const std::filesystem::path& path, const ModelOptions& options)
 }  // namespace
 
 Material parse_material(const std::string& text) {
-  Material m;
-  char rest = 0;
-  require(std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &m.E, &m.nu, &m.rho, &rest) == 3,
-          fmt::format("--material: '{}' is not E,nu,rho, e.g. 67e9,0.33,2840", text));
+  const std::optional<std::vector<double>> values = to_reals(text);
+  require(values && values->size() == 3, fmt::format("--material: '{}' is not E,nu,rho, e.g. 67e9,0.33,2840", text));
+  const Material m{(*values)[0], (*values)[1], (*values)[2]};
   m.validate();
   return m;
 }

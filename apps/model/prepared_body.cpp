@@ -77,16 +77,6 @@ PreparedBody prepare_eq14(const BodyScene& b) {
   return r;
 }
 
-Mesh beam_mesh(BeamGeometry geometry, int refine) {
-  constexpr int highest = 12;
-  if (geometry.order + refine <= highest) {
-    geometry.order += refine;
-  } else {
-    for (BeamSegment& segment : geometry.segments) segment.elements = 2 * std::max(segment.elements, 8);
-  }
-  return make_mesh(geometry);
-}
-
 Mesh solid_mesh(const BodyScene& b, int refine) {
   if (refine == 0) return make_solid_mesh(b.geometry, b.solid);
   const std::optional<SolidOptions> options = refined(chosen(b.geometry, b.solid), refine);
@@ -161,8 +151,16 @@ void write_kept(const std::filesystem::path& file, const PreparedBody& p) {
 
 }  // namespace
 
+BeamGeometry refined(BeamGeometry geometry, int steps) {
+  if (geometry.order + steps <= highest_order)
+    geometry.order += steps;
+  else
+    for (BeamSegment& segment : geometry.segments) segment.elements = 2 * std::max(segment.elements, 8);
+  return geometry;
+}
+
 Mesh mesh_of(const BodyScene& b, int refine) {
-  return b.structure == "solid" ? solid_mesh(b, refine) : beam_mesh(b.geometry, refine);
+  return b.structure == "solid" ? solid_mesh(b, refine) : make_mesh(refined(b.geometry, refine));
 }
 
 bool is_bearable(const Mesh& mesh) {

@@ -26,6 +26,12 @@ struct PreparedBody {
   int coordinates_of_modes() const;
 };
 
+/// Polynomial orders of beam elements go up to this.
+inline constexpr int highest_order = 12;
+
+/// The order raised by so many steps, or where that is too high, elements half as long.
+BeamGeometry refined(BeamGeometry, int steps);
+
 /// Elements of a boom. `refine` raises their order, or where that is the highest makes them smaller; of solids it also
 /// refines singular rims. @throws InputError where there is no mesh that is so coarse.
 Mesh mesh_of(const BodyScene&, int refine = 0);

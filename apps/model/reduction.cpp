@@ -35,16 +35,9 @@ std::pair<std::string, std::string> split(const std::string& text, char at) {
 
 /// Numbers between commas. @throws InputError naming the option.
 std::vector<double> numbers(const std::string& option, const std::string& text) {
-  std::vector<double> result;
-  std::string rest = text;
-  do {
-    const auto [head, tail] = split(rest, ',');
-    const auto value = to_real(head);
-    require(value.has_value(), fmt::format("{}: '{}' is not a number", option, head));
-    result.push_back(*value);
-    rest = tail;
-  } while (!rest.empty());
-  return result;
+  const std::optional<std::vector<double>> values = to_reals(text);
+  require(values.has_value(), fmt::format("{}: '{}' is not a number, or numbers between commas", option, text));
+  return *values;
 }
 
 void check_options(const ReduceArguments& a, const BasisOptions& basis) {
@@ -128,7 +121,8 @@ std::vector<int> selection(const ReducedBody& body, const std::string& text) {
   if (rule == "list") {
     std::vector<int> list;
     for (const double v : values) {
-      require(v == std::floor(v), fmt::format("--select list: {} is no number of a coordinate", v));
+      require(v == std::floor(v) && v >= 1 && v <= body.n(),
+              fmt::format("--select list: {} is not the number of a coordinate; they are 1 to {}", v, body.n()));
       list.push_back(static_cast<int>(v) - 1);
     }
     return listed_modes(body, list);

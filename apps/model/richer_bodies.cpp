@@ -52,7 +52,7 @@ std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions 
         ReducedBody body = for_comparison(model, o, threads);
         if (body.n() > kept.n()) return body;
         return {};
-      } catch (const InputError&) {  // it has not so many
+      } catch (const std::runtime_error&) {  // it has not so many
       }
     }
     return {};
@@ -85,7 +85,7 @@ RicherBodies richer_bodies(const Model& model, const ReductionOptions& options, 
     } else {
       notes.emplace_back("no finer elements are kept for error estimates: they would be too many");
     }
-  } catch (const InputError& e) {
+  } catch (const std::runtime_error& e) {
     notes.push_back(fmt::format("no finer elements are kept for error estimates: {}", e.what()));
   }
   return r;

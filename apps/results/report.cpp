@@ -193,7 +193,7 @@ std::string outputs_table(const json& outputs) {
 
 std::string bodies_table(const json& bodies) {
   std::string r =
-      "<table><tr><th>body</th><th>structure</th><th>unknowns</th><th>modes</th><th>frequencies, clamped "
+      "<table><tr><th>body</th><th>structure</th><th>unknowns</th><th>modes</th><th>frequencies "
       "[Hz]</th></tr>\n";
   for (const json& b : bodies) {
     std::string hz;
@@ -224,7 +224,7 @@ std::string page(const Folder& f) {
       "{0}</title>{1}</head><body>\n<h1>{0}</h1>\n",
       escaped(f.scene.name), style);
   h += status_line(s);
-  h += fmt::format("<p>{} s simulated in {} s ({} times real time), {} steps, {} contacts and releases.</p>\n",
+  h += fmt::format("<p>{} s simulated in {} s ({} times real time), {} steps, {} events.</p>\n",
                    cell(s.at("simulated_seconds")), cell(s.at("seconds").at("integrate")),
                    cell(s.at("real_time_factor")), cell(s.at("steps")), cell(s.at("events")));
   h += animation_html(f.scene, f.table, kept_in(s));

@@ -4,7 +4,6 @@
 #include "apps/model/picture.hpp"
 #include "apps/simulate/tree_flight.hpp"
 #include "fem/base/check.hpp"
-#include "fem/base/stopwatch.hpp"
 #include "fem/formats/vtk/vtk.hpp"
 
 #include <fmt/format.h>
@@ -89,7 +88,7 @@ ordered_json checks_of_references_json(const std::vector<ReferenceCheck>& checks
   return all;
 }
 
-/// null: of a hub without joints.
+/// null: of a run without rows.
 ordered_json energy_json(const std::optional<EnergyOfRun>& energy) {
   if (!energy) return nullptr;
   const EnergyLedger& e = energy->ledger;

@@ -6,7 +6,6 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include <filesystem>
-#include <functional>
 #include <iosfwd>
 #include <string>
 #include <utility>

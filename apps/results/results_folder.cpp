@@ -1,7 +1,6 @@
 #include "apps/results/results_folder.hpp"
 
 #include "apps/base/version.hpp"
-#include "apps/simulate/tree_flight.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/files.hpp"
 #include "fem/base/stopwatch.hpp"

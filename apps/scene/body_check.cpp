@@ -159,6 +159,10 @@ void check_mode_count(Faults& faults, const std::string& path, const BodyScene& 
 void check_model(Faults& faults, const std::string& path, const BodyScene& body) {
   try {
     body.geometry.validate();
+    const ShearRule given = body.geometry.shear, usual;
+    if (body.geometry.theory == BeamTheory::euler_bernoulli && (given.name != usual.name || given.value != usual.value))
+      faults.add(join(path, "shear"),
+                 "is given beside theory = \"euler-bernoulli\", whose beams do not shear; drop one");
     for (const BeamSegment& segment : body.geometry.segments) {
       const bool sheared = body.geometry.theory == BeamTheory::timoshenko;
       const ShearRule rule = sheared ? body.geometry.shear : ShearRule{"value", 1};

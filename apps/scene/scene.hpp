@@ -125,7 +125,7 @@ struct Scene {
   std::vector<BodyScene> bodies;
   std::vector<HingeScene> hinges;
 
-  // With [[joints]] the scene is a tree of bodies; hub, hinges, orbit and the start of the hub are then not used.
+  // With [[joints]] the scene is a tree of bodies; hub, hinges and the start of the hub are then not used.
   bool is_tree = false;
   std::vector<JointScene> joints;
   std::vector<SpringScene> springs;

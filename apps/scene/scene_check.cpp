@@ -89,7 +89,9 @@ void check_integrator(Faults& faults, const Scene& scene) {
   for (const IntegratorMethod& m : integrator_methods())
     if (!redundant) methods.push_back(m.name);
   check_name_among(faults, "integrator.method", scene.integrator, methods);
-  if (redundant) check_multipliers(scene, faults);
+  if (redundant && scene.rescale_at_events)
+    faults.add("integrator.rescale_at_events",
+               "is true, which \"multipliers\" cannot follow; formulation = \"relative\" can");
   const bool has_laws = std::ranges::any_of(scene.joints, [](const JointScene& j) { return j.law.given(); });
   if (has_laws && scene.integrator == "exponential")
     faults.add("integrator.method",
@@ -125,7 +127,7 @@ void check_hinge(Faults& faults, const std::string& path, const HingeScene& hing
 
 void check_body_names(Faults& faults, const Scene& scene) {
   std::set<std::string> taken = {"hub", "lvlh", "energy"};  // first words of other columns
-  if (scene.is_tree) taken = {"energy", std::string(scene_keys::ground)};
+  if (scene.is_tree) taken = {"energy", "lvlh", std::string(scene_keys::ground)};
   for (size_t i = 0; i < scene.bodies.size(); ++i) {
     const std::string& name = scene.bodies[i].name;
     if (!taken.insert(name).second) {

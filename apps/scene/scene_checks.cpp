@@ -25,7 +25,7 @@ constexpr double least_size = 1e-50, most_size = 1e50;
 
 void positive(Faults& faults, const std::string& path, const double& value, std::string_view unit) {
   if (!(std::isfinite(value) && value > 0)) {
-    faults.add(path, fmt::format("is {}{}; it must be positive", value, unit));
+    faults.add(path, fmt::format("is {}{}; it must be positive{}", value, unit, value > 0 ? " and finite" : ""));
   } else if (value < least_size || value > most_size) {
     faults.add(path, fmt::format("is {}{}; what can be computed with lies between {:g} and {:g}", value, unit,
                                  least_size, most_size));

@@ -7,7 +7,6 @@
 #include <array>
 #include <filesystem>
 #include <set>
-#include <span>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -93,9 +92,6 @@ void look_up(const Scene&, PlaceScene&);
 
 /// The same of the node sets that a boom names.
 void spell_sets(BodyScene&);
-
-/// What formulation = "multipliers" cannot do.
-void check_multipliers(const Scene&, toml_reader::Faults&);
 
 /// What is not wrong but may not be meant: springs that press on stops, starts beyond them.
 void warn_of_oddities(const Scene&, std::vector<std::string>& warnings);

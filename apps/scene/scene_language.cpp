@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <set>
 
@@ -148,7 +147,9 @@ void spring_table_keys(Archive& a, LawTable& t) {
 
 void damper_table_keys(Archive& a, LawTable& t) {
   a.key({"rate", "rad/s", "ascending", required}, t.at);
-  a.key({"load", "N m", "at each of them, against the motion, zero at rest", required}, t.load);
+  a.key({"load", "N m", "on b, at each of them: against the motion, so negative at positive rates; zero at rest",
+         required},
+        t.load);
 }
 
 void friction_keys(Archive& a, FrictionLaw& f) {

@@ -13,8 +13,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <set>
 #include <utility>
+#include <vector>
 
 namespace flexboom {
 namespace {
@@ -55,7 +57,7 @@ class TreeCheck {
   // A joint may have the name of the body it carries; its columns are others.
   void check_names() {
     const auto unique = [this](const char* what, const auto& items) {
-      std::set<std::string> taken = {"energy"};
+      std::set<std::string> taken = {"energy", "lvlh"};
       each(what, items, [&](const std::string& path, const auto& item) {
         if (!taken.insert(item.name).second)
           faults_.add(path + ".name", fmt::format("{} is taken; choose another", toml_reader::in_quotes(item.name)));
@@ -65,14 +67,14 @@ class TreeCheck {
     unique("wheels", scene_.wheels);
   }
 
-  const BodyScene* body_named(const std::string& path, const std::string& name) {
+  const BodyScene* body_named(const std::string& path, const std::string& name, bool or_ground = false) {
     std::vector<std::string_view> names;
     for (const BodyScene& b : scene_.bodies) {
       if (b.name == name) return &b;
       names.push_back(b.name);
     }
     if (!bodies_known()) return nullptr;
-    names.push_back(scene_keys::ground);
+    if (or_ground) names.push_back(scene_keys::ground);
     faults_.add(path, toml_reader::not_among(name, names));
     return nullptr;
   }
@@ -84,7 +86,7 @@ class TreeCheck {
       if (!p.marker.empty()) faults_.add(path + ".marker", "needs a body; the inertial frame has none, give a point");
       return;
     }
-    const BodyScene* body = body_named(path + ".body", p.body);
+    const BodyScene* body = body_named(path + ".body", p.body, true);
     if (!body) return;
     if (p.marker.empty() && body->root_moves() && body->is_elastic())
       faults_.add(path + ".point",
@@ -96,16 +98,53 @@ class TreeCheck {
     check_name_among(faults_, path + ".marker", p.marker, std::vector<std::string_view>(names.begin(), names.end()));
   }
 
-  /// Looked at from the start to the end. What has no value between two of these times stops the run there.
+  /// Looked at from the start to the end. What has no value between two of these times, and grows towards none, stops
+  /// the run there.
   void value_everywhere(const std::string& path, const std::function<double(double)>& value) {
-    constexpr int looks = 64;
+    constexpr int looks = 1024;
     if (!(std::isfinite(scene_.duration) && scene_.duration > 0)) return;
+    const double step = scene_.duration / looks;
+    std::vector<double> size;
     for (int i = 0; i <= looks; ++i) {
-      const double t = scene_.duration * i / looks;
-      if (const double v = value(t); !std::isfinite(v))
+      const double t = scene_.duration * i / looks, v = value(t);
+      if (!std::isfinite(v))
         return faults_.add(path, fmt::format("is {} at t = {:g} s; it must have a finite value all through the run",
                                              std::isnan(v) ? "not a number" : "infinite", t));
+      size.push_back(std::abs(v));
     }
+    std::vector<size_t> peaks;
+    for (size_t i = 1; i < looks; ++i)
+      if (size[i] > 0 && size[i] >= size[i - 1] && size[i] >= size[i + 1]) peaks.push_back(i);
+    constexpr size_t most_peaks = 32;  // the highest
+    std::ranges::sort(peaks, std::greater(), [&](size_t i) { return size[i]; });
+    peaks.resize(std::min(peaks.size(), most_peaks));
+    for (const size_t i : peaks) {
+      const double t = step * static_cast<double>(i);
+      if (const std::optional<double> pole = pole_of(value, t - step, t + step))
+        return faults_.add(path, fmt::format("grows without end near t = {:.9g} s; it must have a finite value all "
+                                             "through the run",
+                                             *pole));
+    }
+  }
+
+  /// Where a function has its largest value between two times, if that goes on growing however near one looks. A look
+  /// that comes near to a pole by chance is the largest of the next ones, too.
+  static std::optional<double> pole_of(const std::function<double(double)>& value, double from, double to) {
+    constexpr int zooms = 10, by_chance = 4, looks = 16;
+    constexpr double of_a_peak = 1.5, of_a_pole = 1e4;
+    double first = 0, largest = 0, place = 0;
+    for (int zoom = 0; zoom < zooms; ++zoom) {
+      const double step = (to - from) / looks;
+      for (int i = 0; i <= looks; ++i) {
+        const double v = std::abs(value(from + i * step));
+        if (!std::isfinite(v)) return from + i * step;
+        if (v > largest) largest = v, place = from + i * step;
+      }
+      if (zoom == 0) first = largest;
+      if (zoom == by_chance && largest < of_a_peak * first) return {};
+      from = place - step, to = place + step;
+    }
+    return largest > of_a_pole * first ? std::optional(place) : std::nullopt;
   }
 
   void course(const std::string& path, const CourseScene& c) {
@@ -201,6 +240,8 @@ class TreeCheck {
                   fmt::format("has {} functions; a {} joint needs {}", j.motion.size(), type.name, type.scalars));
     if (j.drive.given())
       faults_.add(path + ".drive", "is given beside motion, whose torque is an output; give one of them");
+    if (j.mechanism.stop_stiffness > 0)
+      faults_.add(path + ".stop_stiffness", "is given beside motion, which no stop can change; give one of them");
     if (!j.start.empty() || !j.start_rate.empty())
       faults_.add(path + (j.start.empty() ? ".start_rate" : ".start"),
                   "is given beside motion, which says it; give one of them");

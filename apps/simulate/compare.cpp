@@ -22,6 +22,7 @@ BodyScene with_model(BodyScene b, BeamTheory theory, bool rotary_inertia) {
   b.structure = "beam";
   b.directions = "hinge-plane";
   b.shapes.clear();
+  b.basis = {};
   b.geometry.theory = theory;
   b.geometry.rotary_inertia = rotary_inertia;
   return b;

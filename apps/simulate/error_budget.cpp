@@ -120,9 +120,11 @@ struct Repeats {
   RunHooks hooks;
   OutputFloors floors;
 
-  /// Another flight at a bearable cost.
+  /// Another flight at a bearable cost. @throws NumericalError where it was interrupted: a part of a run has no error.
   Run repeated(const Run& run, const Scene& other, int refine = 0) const {
-    return fly(other, hooks, refine, bearable_steps(run));
+    Run again = fly(other, hooks, refine, bearable_steps(run));
+    if (again.motion.summary.interrupted) throw NumericalError("interrupted");
+    return again;
   }
 
   std::vector<OutputDifference> difference(const OutputTable& a, const OutputTable& b, const Scene& scene) const {
@@ -306,10 +308,13 @@ double linearisation_error(Scene& scene, Scene& flown, Run& run, Measuring& m) {
   }
   const double bearable = scene.tolerance / 3;
   if (largest(differences) > bearable && any_open_stiffening(scene, flown)) {
-    flown = with_stiffening_left_open(scene, std::move(flown));
+    Scene with_it = with_stiffening_left_open(scene, flown);
+    if (!all_stiffening_is_on(with_it)) stiffened = run_once(with_it, m.repeats.hooks);
+    if (stiffened.motion.summary.interrupted) throw NumericalError("interrupted");
+    flown = std::move(with_it);
     scene = with_stiffening_left_open(scene, scene);
     m.budget.has_stiffened = true;
-    run = all_stiffening_is_on(flown) ? std::move(stiffened) : run_once(flown, m.repeats.hooks);
+    run = std::move(stiffened);
     m.plan.push_back(fmt::format("geometric stiffness changes the outputs by {:.1e}: the run that is kept has it",
                                  largest(differences)));
     differences.clear();

@@ -362,10 +362,9 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
     return has_chosen;
   }
   Scene better = scene;
-  constexpr int highest = 12;
   for (const size_t i : open_) {
     BodyScene& b = better.bodies[i];
-    if (b.structure == "beam") b.geometry.order = std::min(b.geometry.order + 2, highest);
+    if (b.structure == "beam") b.geometry = refined(b.geometry, 2);
     if (b.structure != "solid") continue;
     const auto finer = refined(chosen(b.geometry, b.solid), 1);
     if (!finer) return false;
@@ -373,8 +372,7 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
     if (!is_bearable(mesh_of(b, 1))) return false;  // the budget takes a step more
   }
   scene = std::move(better);
-  plan.push_back(
-      fmt::format("discretisation: {:.1e} in {}; elements of a higher order", worst->discretisation, worst->name));
+  plan.push_back(fmt::format("discretisation: {:.1e} in {}; finer elements", worst->discretisation, worst->name));
   return true;
 }
 

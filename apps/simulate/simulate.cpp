@@ -9,7 +9,6 @@
 #include "apps/simulate/steady_motion.hpp"
 #include "apps/simulate/tree_flight.hpp"
 #include "apps/simulate/verify.hpp"
-#include "dynamics/numerics/rotation.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 
@@ -18,8 +17,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <numbers>
 
 namespace flexboom {
 
@@ -86,7 +83,7 @@ PreparedBody prepared(const BodyScene& b, int refine, const std::filesystem::pat
   return hooks.bodies != nullptr ? hooks.bodies->get(b, refine, keep) : prepare_body(b, refine, keep);
 }
 
-Run run_once(const Scene& given, const RunHooks& hooks, int refine, long max_steps) {
+Run fly_once(const Scene& given, const RunHooks& hooks, int refine, long max_steps) {
   const Stopwatch start;
   const Scene scene = with_joints(with_steady_motions(given));
   std::vector<PreparedBody> bodies;
@@ -95,6 +92,11 @@ Run run_once(const Scene& given, const RunHooks& hooks, int refine, long max_ste
   const auto fly = scene.formulation == "multipliers" ? fly_by_multipliers : fly_tree;
   Run r = fly(scene, std::move(bodies), hooks, max_steps);
   r.prepare_seconds += seconds;
+  return r;
+}
+
+Run run_once(const Scene& scene, const RunHooks& hooks, int refine, long max_steps) {
+  Run r = fly_once(scene, hooks, refine, max_steps);
   r.bending = bending_of(r);
   return r;
 }
@@ -193,6 +195,12 @@ void add_warnings(const Run& run, RunResult& r) {
                       "of small deflections no longer holds",
                       run.bodies[i].body.name, b.size, b.time, 100 * b.of_length));
   r.warnings.insert(r.warnings.end(), run.motion.warnings.begin(), run.motion.warnings.end());
+  constexpr Eigen::Index few = 5;
+  if (const Eigen::Index rows = run.outputs.values.rows(); r.budget.measured && rows < few)
+    r.warnings.push_back(
+        fmt::format("outputs have {} rows, and errors are measured at them alone; a smaller "
+                    "output_step shows what is between",
+                    rows));
   warn_of_the_balance(run.motion.summary, r);
   if (!r.budget.measured || r.budget.within(r.scene.tolerance)) return;
   const std::string why =
@@ -269,8 +277,8 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
   constexpr long worth_repeating = 2'000'000;
   const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating;
   if (r.scene.error_budget && !repeat)
-    words.push_back(fmt::format("error budget: not measured, its repeats would cost many times {} evaluations",
-                                run.motion.summary.rhs_evaluations));
+    warning = fmt::format("the error budget was not measured: its repeats would cost many times {} evaluations",
+                          run.motion.summary.rhs_evaluations);
   const auto tell_before_the_repeats = [&] {  // which may take long
     if (of_run.checkpoint) of_run.checkpoint(run, 0);
   };
@@ -278,8 +286,13 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
     const Stopwatch start;
     tell_before_the_repeats();
     r.budget = measure_budget(r.scene, run, hooks, words, planner.still());
-    while (planner.improve(r.scene, r.budget, hooks, r.plan)) {
-      run = run_once(r.scene, of_run);
+    for (RunResult whole = r; planner.improve(r.scene, r.budget, hooks, r.plan); whole = r) {
+      Run better = run_once(r.scene, of_run);
+      if (better.motion.summary.interrupted) {  // a part of a run is worth less than a whole one
+        r = std::move(whole);
+        break;
+      }
+      run = std::move(better);
       tell_before_the_repeats();
       words.clear();
       r.budget = measure_budget(r.scene, run, hooks, words, planner.still());

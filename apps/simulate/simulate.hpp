@@ -32,7 +32,7 @@ struct RunResult {
   std::shared_ptr<const Tree> tree;  // of the joints that close no loop
   OutputTable outputs;
   FlightState end;                    // from which another run can go on
-  std::optional<EnergyOfRun> ledger;  // of a scene with joints
+  std::optional<EnergyOfRun> ledger;  // none before the first row
   ErrorBudget budget;
   std::vector<ReferenceCheck> checks;  // where the scene is to be verified
   std::vector<std::string> plan;       // what was chosen and why, one line each
@@ -109,22 +109,11 @@ PreparedBody prepared(const BodyScene&, int refine, const std::filesystem::path&
 
 /// `max_steps` > 0 bounds its cost: NumericalError above.
 Run run_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
+/// The same, but for how far bodies bend.
+Run fly_once(const Scene&, const RunHooks&, int refine = 0, long max_steps = 0);
 
 /// Time, numbers and modes at the end of a flight; names and stops are for the caller.
 FlightState end_of(const std::vector<PreparedBody>&, double time, const Eigen::VectorXd& y,
                    const MotionScales& largest);
-
-/// Of a flight on its way: its events and summary, and the rows from `first` on that come before `last`.
-template <class Flight>
-Flight rows_of(const Flight& f, size_t first, size_t last) {
-  const auto part = [&](const auto& rows) {
-    return std::decay_t<decltype(rows)>(rows.begin() + static_cast<std::ptrdiff_t>(first),
-                                        rows.begin() + static_cast<std::ptrdiff_t>(last));
-  };
-  Flight r;
-  r.time = part(f.time), r.y = part(f.y), r.balance = part(f.balance);
-  r.events = f.events, r.summary = f.summary;
-  return r;
-}
 
 }  // namespace flexboom

@@ -4,7 +4,6 @@
 #include "apps/simulate/tree_flight.hpp"
 
 #include <algorithm>
-#include <utility>
 #include <vector>
 
 namespace flexboom {

@@ -351,6 +351,23 @@ void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<
   }
 }
 
+namespace {
+
+/// Of a motion on its way: its events and summary, and the rows from `first` on that come before `last`.
+TreeTrajectory rows_of(const TreeTrajectory& all, size_t first, size_t last) {
+  const auto part = [&](const auto& rows) {
+    const auto begin = rows.begin() + static_cast<std::ptrdiff_t>(std::min(first, rows.size()));
+    return std::decay_t<decltype(rows)>(begin, rows.begin() + static_cast<std::ptrdiff_t>(std::min(last, rows.size())));
+  };
+  TreeTrajectory r;
+  r.time = part(all.time), r.y = part(all.y), r.balance = part(all.balance), r.laws = part(all.laws);
+  r.events = all.events, r.summary = all.summary;
+  r.stiffening_effect = all.stiffening_effect, r.warnings = all.warnings;
+  return r;
+}
+
+}  // namespace
+
 Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHooks& hooks, long max_steps) {
   const Stopwatch start;
   const Multibody multibody = make_multibody(scene, bodies);
@@ -368,12 +385,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
       if (outputs < told) told = 0;  // another method has begun anew
       if (will_be_revised(scene, multibody, effect, stiffening)) return;
       Run part = r;
-      TreeTrajectory rows = rows_of(so_far, told, outputs);
-      if (!so_far.laws.empty())
-        rows.laws.assign(so_far.laws.begin() + static_cast<std::ptrdiff_t>(told),
-                         so_far.laws.begin() + static_cast<std::ptrdiff_t>(outputs));
-      rows.stiffening_effect = so_far.stiffening_effect, rows.warnings = so_far.warnings;
-      set_flown(scene, std::move(rows), part);
+      set_flown(scene, rows_of(so_far, told, outputs), part);
       part.end = end_of(part, scene, so_far.time.back(), so_far.y.back(), so_far.summary);
       part.integrate_seconds = flight_time.seconds();
       hooks.checkpoint(std::move(part), std::exchange(told, outputs));

@@ -4,7 +4,6 @@
 #include "apps/simulate/flights_ahead.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <stdexcept>
 #include <utility>
 
@@ -68,6 +67,7 @@ std::vector<ReferenceCheck> reference_checks(const RunResult& r, const RunHooks&
     check.what = reference.what;
     try {
       const Run run = fly(reference.scene, quiet, reference.refine);
+      if (run.motion.summary.interrupted) break;
       check.method = run.motion.summary.method;
       const auto of = [&](const OutputTable& table) {
         return reference.other_basis ? without_coordinates(table) : table;

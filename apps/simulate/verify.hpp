@@ -7,9 +7,9 @@
 
 namespace flexboom {
 
-/// Runs that share as little as possible with the one they are held against: another method, the other formulation, six
-/// more modes in each plane, elements four orders higher, all geometric stiffness; and all of these at once. A run that
-/// fails is a check that says why.
+/// Runs that share as little as possible with the one they are held against. One has another method, one the other
+/// formulation, one twice the modes of each kind and six more at least, one elements four orders higher, one all
+/// geometric stiffness, and one all of these at once. A run that fails is a check that says why.
 std::vector<ReferenceCheck> reference_checks(const RunResult&, const RunHooks&);
 
 }  // namespace flexboom

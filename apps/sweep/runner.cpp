@@ -1,9 +1,8 @@
 #include "apps/sweep/runner.hpp"
 
 #include "apps/simulate/error_budget.hpp"
-#include "apps/simulate/multipliers_flight.hpp"
 #include "apps/simulate/planner.hpp"
-#include "apps/simulate/tree_flight.hpp"
+#include "apps/simulate/steady_motion.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 
@@ -24,11 +23,11 @@ SweepRunner::SweepRunner(SceneSource source, SweepValues values, bool loads, boo
       scene_(source_.read()) {
   std::vector<std::string> plan;
   const double given = scene_.integrator_tolerance;
-  Planner(scene_).choose(scene_, {}, plan);
-  set_options(scene_);
   scene_.bodies_kept_in = source_.bodies_kept_in();
+  Planner(scene_).choose(scene_, hooks(), plan);
+  set_options(scene_);
   validate(scene_);
-  for (const BodyScene& b : with_joints(scene_).bodies)
+  for (const BodyScene& b : with_joints(with_steady_motions(scene_)).bodies)
     if (b.is_boom()) bodies_.get(b, 0, scene_.bodies_kept_in);
   settle();
   if (scene_.integrator_tolerance != given) digits_share_ = scene_.digits_share();
@@ -38,14 +37,18 @@ SweepRunner::SweepRunner(SceneSource source, SweepValues values, bool loads, boo
 /// How much tighter than its accuracy the scene as it stands must be flown: so are all runs.
 void SweepRunner::settle() {
   if (wanted_pointings(scene_).empty()) return;
-  RunHooks hooks;
-  hooks.bodies = &bodies_;
   std::vector<std::string> plan;
   try {
-    Run run = run_once(scene_, hooks);
-    settle_pointing(scene_, run, hooks, plan);
+    Run run = run_once(scene_, hooks());
+    settle_pointing(scene_, run, hooks(), plan);
   } catch (const std::exception&) {  // is reported as a run, where it is one
   }
+}
+
+RunHooks SweepRunner::hooks() {
+  RunHooks r;
+  r.bodies = &bodies_;
+  return r;
 }
 
 void SweepRunner::look_for_columns(size_t runs) {
@@ -81,13 +84,7 @@ Scene SweepRunner::scene_of_run(size_t run) const {
   return scene;
 }
 
-Run SweepRunner::simulate(const Scene& given) {
-  const Scene scene = with_joints(given);
-  std::vector<PreparedBody> bodies;
-  for (const BodyScene& b : scene.bodies) bodies.push_back(bodies_.get(b));
-  const auto fly = scene.formulation == "multipliers" ? fly_by_multipliers : fly_tree;
-  return fly(scene, std::move(bodies), {}, 0);
-}
+Run SweepRunner::simulate(const Scene& scene) { return fly_once(scene, hooks()); }
 
 RunOutcome SweepRunner::run(size_t run) {
   const Stopwatch start;

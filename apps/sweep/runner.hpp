@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -45,6 +44,7 @@ class SweepRunner {
   RunOutcome run(size_t run);
 
  private:
+  RunHooks hooks();
   Scene scene_of_run(size_t run) const;
   void settle();
   void set_options(Scene&) const;

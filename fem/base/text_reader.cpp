@@ -70,6 +70,18 @@ std::optional<double> to_real(std::string_view token, bool fortran) {
   return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
+std::optional<std::vector<double>> to_reals(std::string_view text) {
+  std::vector<double> values;
+  for (size_t from = 0; from != std::string_view::npos;) {
+    const size_t comma = text.find(',', from);
+    const std::optional<double> value = to_real(text.substr(from, comma - from));
+    if (!value) return {};
+    values.push_back(*value);
+    from = comma == std::string_view::npos ? comma : comma + 1;
+  }
+  return values;
+}
+
 std::optional<std::string_view> TextReader::next_line() {
   if (at_end()) return {};
   const size_t end = std::min(text_.find('\n', position_), text_.size());

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace flexboom {
 
@@ -36,6 +37,9 @@ std::optional<long> to_integer(std::string_view);
 
 /// As to_integer; `nan`, `inf` and overflow are no numbers. Fortran: exponents may be written with D and d.
 std::optional<double> to_real(std::string_view, bool fortran = false);
+
+/// Numbers between commas, one at least; nothing if any is none.
+std::optional<std::vector<double>> to_reals(std::string_view);
 
 /// Reads text in memory, by lines or by tokens between white space. Everything returned is a view into that text, so a
 /// fault costs nothing to keep: its line and column are found when it is reported.

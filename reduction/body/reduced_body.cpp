@@ -5,6 +5,7 @@
 #include "reduction/body/diagonal.hpp"
 #include "reduction/body/tilde.hpp"
 
+#include <fmt/format.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
@@ -81,7 +82,7 @@ void validate_flexible_part(const ReducedBody& body, const Checker& c) {
   c.count(body.J2.size(), n, "J2");
   c.count(body.coordinates.size(), n, "coordinates");
   for (size_t k = 0; k < body.Cr1.size(); ++k) {
-    const std::string index = "[" + std::to_string(k) + "]";
+    const std::string index = fmt::format("[{}]", k);
     c.shape(body.Cr1[k], 3, n, "Cr1" + index);
     c.shape(body.J1[k], 3, 3, "J1" + index);
     c.count(body.J2[k].size(), n, "J2" + index);
@@ -232,7 +233,7 @@ const Marker& marker(const ReducedBody& body, const std::string& name) {
 void apply_damping(ReducedBody& body, const DampingRule& rule) {
   const std::string where = "body \"" + body.name + "\": damping";
   for (const double value : {rule.value, rule.alpha, rule.beta}) {
-    require(std::isfinite(value) && value >= 0, where + " must not be negative, got " + std::to_string(value));
+    require(std::isfinite(value) && value >= 0, fmt::format("{} must not be negative, got {}", where, value));
   }
   if (rule.name == "none") {
     body.De.setZero(body.n(), body.n());

@@ -220,7 +220,7 @@ class BadInput(Case):
 
     def test_modes_options(self):
         self.assert_refused("modes", BOOM4, "--count", "100000", words="unknowns")
-        self.assert_refused("modes", BOOM4, "--count", "0", words="--count")
+        self.assert_exit(USAGE, flexboom("modes", BOOM4, "--count", "0"))
         self.assert_refused("modes", BOOM4, "--clamp", "absent", words='"root"')
         for text in ("nonsense", "67e9,0.33", "67e9,0.33,2840,1", "67e9,0.6,2840", "-1,0.3,1", "nan,0.3,1"):
             self.assert_refused("modes", BOOM4, "--material", text, words="material")
@@ -1336,6 +1336,8 @@ class Reduce(Case):
         self.refused("--spin", "0,0,1", words="prestressed")
         self.refused("--basis", "prestressed", "--spin", "0,0,1", "--turns", "w", words="X,Y,Z")
         self.refused("--select", "best", words="--select")
+        self.refused("--select", "list:0", words="they are 1 to")
+        self.refused("--select", "list:1,2,", words="numbers between commas")
         self.refused("--damping", "much", words="--damping")
         self.refused("--attach", "tip", words="tip.Fy")
 

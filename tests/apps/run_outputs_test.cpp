@@ -97,17 +97,21 @@ TEST(Tip, MarkersOfPlacesCompareWithoutCase) {
 
 // A function of time that has no value names itself, wherever it is and whoever asks. This one has values at the times
 // that a reader looks at, multiples of 1 / 64 of the duration.
+// Between the times at which a function is looked at before the run.
 TEST(FunctionOfTime, WithoutAValueIsNamed) {
   const struct {
     const char *more, *words;
   } cases[] = {
-      {"drive = \"log(cos(8042.477193189871*t))\"\n", "joint hinge: drive is "},
-      {"motion = \"log(cos(8042.477193189871*t))\"\n", "joint hinge: motion is "},
-      {"[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\nforce = [0, \"log(cos(8042.477193189871*t))\", 0]\n",
+      {"drive = \"t + 0*log(cos(128679.63509103794*t))\"\n", "joint hinge: drive is "},
+      {"motion = \"t + 0*log(cos(128679.63509103794*t))\"\n", "joint hinge: motion is "},
+      {"[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\nforce = [0, \"t + 0*log(cos(128679.63509103794*t))\", "
+       "0]\n",
        "load push: force[1] is "},
-      {"[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\ntorque = [0, 0, \"log(cos(8042.477193189871*t))\"]\n",
+      {"[[loads]]\nname = \"push\"\nat = { body = \"hub\" }\ntorque = [0, 0, \"t + "
+       "0*log(cos(128679.63509103794*t))\"]\n",
        "load push: torque[2] is "},
-      {"[[wheels]]\nname = \"spin\"\nbody = \"hub\"\ninertia = 1e-3\ntorque = \"log(cos(8042.477193189871*t))\"\n",
+      {"[[wheels]]\nname = \"spin\"\nbody = \"hub\"\ninertia = 1e-3\ntorque = \"t + "
+       "0*log(cos(128679.63509103794*t))\"\n",
        "wheel spin: torque is "},
   };
   const std::string without_start = with(swing_on_joints, "start = 0.07\n", "");  // a motion has its own

@@ -137,7 +137,7 @@ TEST(Scene, EveryKeyIsRead) {
   EXPECT_TRUE(body.modes_auto);
   EXPECT_EQ(body.geometry.shear.name, "value");
   EXPECT_EQ(body.geometry.shear.value, 0.85);
-  EXPECT_EQ(body.geometry.theory, BeamTheory::euler_bernoulli);
+  EXPECT_EQ(body.geometry.theory, BeamTheory::timoshenko);
   const auto& end = std::get<GeneralSection>(body.geometry.segments.at(1).end);
   EXPECT_EQ(end.A, 2e-5);
   EXPECT_EQ(end.Iz, 2e-10);  // as the start

@@ -154,6 +154,15 @@ class Values(Case):
         np.testing.assert_array_equal(trajectory, np.array(list(columns.values())).T)
 
 
+    def test_bodies_stiffened_by_the_motion_of_the_scene(self):
+        text = (cli.MESHES / "wire-spinner.toml").read_text()
+        scene = self.folder / "wires.toml"
+        scene.write_text(text.replace("modes = 8", 'modes = 2\nbasis = "prestressed"'))
+        result = flexboom("sweep", scene, "--vary", "duration=0.1,0.2", "--out", self.folder / "wires")
+        self.assert_exit(OK, result)
+        self.assertEqual(self.table(self.folder / "wires")["status"], ["ok", "ok"])
+
+
 class Journal(Case):
     DRAW = ("--vary", "hub.mass=normal:9:0.5", "--vary", "hinges.sip.P2=uniform:0.01:0.03", "-n", "400", *POINTING)
 
