@@ -1,9 +1,9 @@
 #include "apps/bench/modes.hpp"
 
+#include "apps/bench/boom4.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/files.hpp"
 #include "fem/base/process.hpp"
-#include "fem/booms/solid_boom.hpp"
 #include "fem/formats/abaqus/write.hpp"
 #include "fem/formats/common/mesh_file.hpp"
 
@@ -19,13 +19,6 @@ namespace flexboom {
 namespace {
 
 constexpr int modes = 10;
-
-/// Boom 4 of SPORT (Mantovani et al. 2020, Table 1): solid round bar of aluminium.
-BeamGeometry boom4_geometry() {
-  BeamGeometry boom;
-  boom.segments = {{RoundBar{0.01}, RoundBar{0.01}, 0.302, Material{67e9, 0.33, 2840}, 0}};
-  return boom;
-}
 
 double largest_difference(const std::vector<double>& a, const std::vector<double>& b) {
   if (a.size() < modes || b.size() < modes) return std::nan("");
@@ -76,13 +69,6 @@ void run_calculix(ModesBench& row, const std::filesystem::path& deck, const std:
   row.difference = largest_difference(hz, calculix_frequencies(std::filesystem::path(deck).replace_extension(".dat")));
 }
 
-/// A uniform mesh: rings and sectors of the section, elements along the boom.
-struct Rung {
-  int sectors;
-  int rings;
-  int along;
-};
-
 /// A ladder of uniform meshes of one element, written as decks so that both programs read the same file.
 struct Ladder {
   std::string element;
@@ -92,7 +78,7 @@ struct Ladder {
 
 const std::vector<Ladder>& ladders() {
   static const std::vector<Ladder> all = {
-      {"hex20", true, {{1, 1, 38}, {2, 1, 76}, {3, 2, 76}, {4, 2, 100}, {6, 3, 84}}},
+      {"hex20", true, {hex20_rungs.begin(), hex20_rungs.end()}},
       {"hex20-reduced", false, {{1, 1, 38}, {2, 1, 76}, {3, 2, 76}, {4, 2, 100}}},
       {"tet10", true, {{1, 1, 30}, {2, 1, 40}, {2, 2, 76}, {4, 2, 84}}},
       {"hex8", false, {{2, 1, 76}, {4, 2, 151}, {8, 4, 302}}},
@@ -101,18 +87,10 @@ const std::vector<Ladder>& ladders() {
   return all;
 }
 
-Mesh uniform_mesh(const std::string& element, const Rung& rung) {
-  SolidOptions options;
-  options.element = element;
-  options.grading.sectors = rung.sectors;
-  options.grading.rings = rung.rings;
-  options.grading.long_elements = rung.along;
-  options.grading.end_layers = 0;
-  options.grading.corner_levels = 0;
-  Mesh mesh = make_solid_mesh(boom4_geometry(), options);
-  for (const int node : node_set(mesh, "root")) {
+Mesh held_mesh(const std::string& element, const Rung& rung) {
+  Mesh mesh = uniform_mesh(element, rung);
+  for (const int node : node_set(mesh, "root"))
     mesh.supports.push_back({node, {true, true, true, false, false, false}});
-  }
   return mesh;
 }
 
@@ -146,7 +124,7 @@ class ModesLadder {
                      .model = fmt::format("{} x {} x {}", rung.sectors, rung.rings, rung.along)};
       const std::filesystem::path deck =
           folder_ / fmt::format("{}_{}_{}_{}.inp", ladder.element, rung.sectors, rung.rings, rung.along);
-      write_abaqus(deck, uniform_mesh(ladder.element, rung), modes);
+      write_abaqus(deck, held_mesh(ladder.element, rung), modes);
       std::vector<double> hz;
       run_flexboom(row, deck, {}, hz);
       if (ladder.with_calculix) run_calculix(row, deck, hz);
@@ -184,8 +162,8 @@ class ModesLadder {
 }  // namespace
 
 std::vector<double> boom4_reference_hz() {
-  const Material m = boom4_geometry().segments.front().material;
-  const double torsion = std::sqrt(m.shear_modulus() / m.rho) / (4 * boom4_geometry().length());
+  const Material m = boom4().segments.front().material;
+  const double torsion = std::sqrt(m.shear_modulus() / m.rho) / (4 * boom4().length());
   return {74.57570632384,  74.57570632384, 465.60850721105, 465.60850721105, 1296.0223559708,
           1296.0223559708, torsion,        2518.2917811872, 2518.2917811872, 4024.8984845735};
 }

@@ -1,8 +1,8 @@
 #include "apps/bench/reduction.hpp"
 
+#include "apps/bench/boom4.hpp"
 #include "fem/base/blas_threads.hpp"
 #include "fem/base/stopwatch.hpp"
-#include "fem/booms/solid_boom.hpp"
 #include "reduction/basis/mode_selection.hpp"
 #include "reduction/body/geometric_stiffness_loads.hpp"
 #include "reduction/invariants/geometric_stiffness.hpp"
@@ -32,24 +32,9 @@ using Eigen::VectorXd;
 constexpr std::array<int, 5> mode_counts = {2, 5, 10, 20, 50};
 constexpr int compared_modes = 10;
 
-/// Boom 4 of SPORT (Mantovani et al. 2020, Table 1): solid round bar of aluminium.
-BeamGeometry boom4(int elements = 0, int order = 8) {
-  BeamGeometry boom;
-  boom.segments = {{RoundBar{0.01}, RoundBar{0.01}, 0.302, Material{67e9, 0.33, 2840}, elements}};
-  boom.order = order;
-  return boom;
-}
-
 Mesh graded_mesh(double accuracy) {
   SolidOptions options;
   options.accuracy = accuracy;
-  return make_solid_mesh(boom4(), options);
-}
-
-Mesh uniform_mesh(int sectors, int rings, int along) {
-  SolidOptions options;
-  options.element = "hex20";
-  options.grading = {.sectors = sectors, .rings = rings, .long_elements = along, .end_layers = 0, .corner_levels = 0};
   return make_solid_mesh(boom4(), options);
 }
 
@@ -232,10 +217,9 @@ class ReductionLadder {
       if (!add("hex", fmt::format("accuracy 1e{:.0f}", std::log10(accuracy)), graded_mesh(accuracy), reference)) break;
     }
     start_ladder();
-    for (const auto& [sectors, rings, along] :
-         {std::array{1, 1, 38}, {2, 1, 76}, {3, 2, 76}, {4, 2, 100}, {6, 3, 84}}) {
-      const std::string name = fmt::format("{} x {} x {}", sectors, rings, along);
-      if (!add("hex20", name, uniform_mesh(sectors, rings, along), reference)) break;
+    for (const Rung& rung : hex20_rungs) {
+      const std::string name = fmt::format("{} x {} x {}", rung.sectors, rung.rings, rung.along);
+      if (!add("hex20", name, uniform_mesh("hex20", rung), reference)) break;
     }
   }
 

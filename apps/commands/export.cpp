@@ -28,10 +28,7 @@ int export_command(const ExportArguments& a, const CommonOptions& common) {
     fmt::print("{}\n", j.dump(2));
   } else if (!common.quiet) {
     for (const std::string& sentence : report.cannot_hold) print_note("note: " + sentence);
-    for (const BodyCheck& c : report.checks)
-      fmt::print("{:<58} {:22.14g} {:22.14g} {:10.1e}{}\n", c.name, c.value, c.reference, c.relative_error,
-                 c.passed ? "" : "  FAILED");
-    fmt::print("{}\n", a.path.string());
+    fmt::print("{}{}\n", checks_text(report.checks), a.path.string());
   }
   return passed ? exit_ok : exit_check_failed;
 }

@@ -1,6 +1,7 @@
 #include "apps/commands/commands.hpp"
 #include "apps/commands/terminal_line.hpp"
 #include "apps/model/bounded_modes.hpp"
+#include "apps/model/picture.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 #include "fem/formats/common/mesh_file.hpp"
@@ -52,10 +53,7 @@ VtkGrid shapes_grid(const BoundedModes& m) {
   const DisplayShape display = reduce(model.mesh, assembly, basis, model.name).display;
   VtkGrid grid;
   grid.points = display.points;
-  constexpr int vtk_line = 3;  // two points: meshio skips polylines
-  for (const std::vector<int>& line : display.lines) {
-    for (size_t k = 0; k + 1 < line.size(); ++k) grid.cells.push_back({vtk_line, {line[k], line[k + 1]}});
-  }
+  add_cells(display, 0, grid);
   for (int k = 0; k < modes; ++k) {
     Eigen::MatrixXd field(3, grid.points.cols());
     for (Eigen::Index i = 0; i < field.cols(); ++i) field.col(i) = display.S[static_cast<size_t>(i)].col(k);

@@ -11,27 +11,20 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-namespace {
-
-constexpr int vtk_line = 3, vtk_triangle = 5;  // lines of two points: meshio skips polylines
-
-/// The lines and triangles of a shape as cells of a grid in which its points begin at `first`.
 void add_cells(const DisplayShape& shape, int first, VtkGrid& grid) {
+  constexpr int vtk_line = 3, vtk_triangle = 5;  // lines of two points: meshio skips polylines
   for (const std::vector<int>& line : shape.lines)
     for (size_t k = 0; k + 1 < line.size(); ++k)
       grid.cells.push_back({vtk_line, {first + line[k], first + line[k + 1]}});
   for (const auto& [a, b, c] : shape.triangles) grid.cells.push_back({vtk_triangle, {first + a, first + b, first + c}});
 }
 
-}  // namespace
-
 DisplayShape box_of(const ReducedBody& body, const Vector3d& size) {
   const Vector3d centre = body.mc0 / body.m;
   Matrix3d axes = Matrix3d::Identity();
   Vector3d sides = size;
   if (size.isZero(0)) {
-    const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(
-        Matrix3d(body.J0 - body.m * (centre.squaredNorm() * Matrix3d::Identity() - centre * centre.transpose())));
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(Matrix3d(body.J0 - centre_inertia(body.m, body.mc0)));
     const Vector3d& J = principal.eigenvalues();
     axes = principal.eigenvectors();
     // J_i = m (a_j^2 + a_k^2) / 12

@@ -13,6 +13,9 @@ namespace flexboom {
 /// zero the box of equal mass and inertia.
 DisplayShape box_of(const ReducedBody&, const Eigen::Vector3d& size = Eigen::Vector3d::Zero());
 
+/// Adds the lines and triangles of a shape as cells of a grid in which its points begin at `first`.
+void add_cells(const DisplayShape&, int first, VtkGrid&);
+
 /// Bodies where a state of the tree has them, deformed, inertial axes. Point data "displacement" [m], cell data "body"
 /// numbers them from 0.
 VtkGrid picture(const Tree&, double t, const Eigen::VectorXd& y);

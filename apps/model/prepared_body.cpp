@@ -27,18 +27,17 @@
 
 namespace flexboom {
 
-using Eigen::Matrix3d;
 using Eigen::MatrixXd;
+using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
 
 PreparedBody prepare_rigid(const BodyScene& b) {
   const RigidScene& r = *b.rigid;
-  const Matrix3d J =
-      r.inertia + r.mass * (r.centre.squaredNorm() * Matrix3d::Identity() - r.centre * r.centre.transpose());
+  const Vector3d mc0 = r.mass * r.centre;
   PreparedBody p;
-  p.body = rigid_body(b.name, r.mass, r.mass * r.centre, J);
+  p.body = rigid_body(b.name, r.mass, mc0, r.inertia + centre_inertia(r.mass, mc0));
   p.body.display = box_of(p.body, r.size);
   return p;
 }
@@ -152,7 +151,7 @@ void write_kept(const std::filesystem::path& file, const PreparedBody& p) {
 }  // namespace
 
 BeamGeometry refined(BeamGeometry geometry, int steps) {
-  if (geometry.order + steps <= highest_order)
+  if (geometry.order + steps <= highest_beam_order)
     geometry.order += steps;
   else
     for (BeamSegment& segment : geometry.segments) segment.elements = 2 * std::max(segment.elements, 8);

@@ -26,9 +26,6 @@ struct PreparedBody {
   int coordinates_of_modes() const;
 };
 
-/// Polynomial orders of beam elements go up to this.
-inline constexpr int highest_order = 12;
-
 /// The order raised by so many steps, or where that is too high, elements half as long.
 BeamGeometry refined(BeamGeometry, int steps);
 

@@ -346,6 +346,11 @@ std::string description(const ReducedBody& body, const std::vector<BodyCheck>& c
   }
   text += root_load_table(body);
   text += fmt::format("{:<58} {:>22} {:>22} {:>10}\n", "check", "value", "reference", "error");
+  return text + checks_text(checks);
+}
+
+std::string checks_text(const std::vector<BodyCheck>& checks) {
+  std::string text;
   for (const BodyCheck& c : checks)
     text += fmt::format("{:<58} {:22.14g} {:22.14g} {:10.1e}{}\n", c.name, c.value, c.reference, c.relative_error,
                         c.passed ? "" : "  FAILED");

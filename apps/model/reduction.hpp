@@ -73,6 +73,7 @@ std::string description(const ReducedBody&, const std::vector<BodyCheck>& checks
 nlohmann::ordered_json body_json(const ReducedBody&, const std::vector<BodyCheck>& checks,
                                  const std::vector<std::string>& notes);
 nlohmann::ordered_json seconds_json(const ReductionSeconds&);
+std::string checks_text(const std::vector<BodyCheck>&);
 nlohmann::ordered_json checks_json(const std::vector<BodyCheck>&);
 
 /// "modal:0.005", "loss-factor:0.01", "rayleigh:ALPHA,BETA", "none". @throws InputError.

@@ -1,5 +1,7 @@
 #include "apps/results/results.hpp"
 
+#include "apps/model/reduction.hpp"
+
 #include "apps/base/version.hpp"
 #include "apps/model/picture.hpp"
 #include "apps/simulate/tree_flight.hpp"
@@ -50,22 +52,21 @@ std::string event_rows(const RunResult& r, size_t first) {
 
 namespace {
 
-/// Parts and total of errors: of an output, or of all.
-template <class Errors>
-ordered_json parts_json(const Errors& e, bool measured = true) {
-  const auto part = [measured](double error) { return measured ? ordered_json(error) : ordered_json(nullptr); };
-  return {{"discretisation", part(e.discretisation)},
-          {"truncation", part(e.truncation)},
-          {"time", part(e.time)},
-          {"linearisation", part(e.linearisation)},
-          {"total", part(e.total())}};
+/// Errors of an output, or of all; null where they were not measured.
+ordered_json parts_json(const ErrorParts& e, double total, bool measured = true) {
+  ordered_json j;
+  for (const auto& [name, part] : error_parts) j[std::string(name)] = e.*part;
+  j["total"] = total;
+  if (!measured)
+    for (ordered_json& error : j) error = nullptr;
+  return j;
 }
 
 ordered_json budget_json(const ErrorBudget& b) {
-  ordered_json j = parts_json(b, b.measured);
+  ordered_json j = parts_json(b, b.total(), b.measured);
   ordered_json outputs = ordered_json::object();
   for (const OutputErrors& o : b.outputs) {
-    outputs[o.name] = parts_json(o);
+    outputs[o.name] = parts_json(o, o.total());
     if (o.is_of_its_basis()) outputs[o.name]["discretisation"] = outputs[o.name]["truncation"] = nullptr;
     outputs[o.name]["scale"] = o.scale;
     outputs[o.name]["worst_at"] = o.when;
@@ -117,15 +118,13 @@ ordered_json bodies_json(const RunResult& r) {
   return bodies;
 }
 
-ordered_json checks_json(const RunResult& r) {
+ordered_json checks_of_bodies(const RunResult& r) {
   ordered_json checks = ordered_json::array();
   for (const PreparedBody& p : r.bodies)
-    for (const BodyCheck& c : p.checks)
-      checks.push_back({{"name", p.body.name + "." + c.name},
-                        {"value", c.value},
-                        {"reference", c.reference},
-                        {"relative_error", c.relative_error},
-                        {"passed", c.passed}});
+    for (ordered_json c : flexboom::checks_json(p.checks)) {
+      c["name"] = p.body.name + "." + c["name"].get<std::string>();
+      checks.push_back(std::move(c));
+    }
   return checks;
 }
 
@@ -165,7 +164,7 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   j["plan"] = r.plan;
   j["warnings"] = r.warnings;
   j["bodies"] = bodies_json(r);
-  j["invariant_checks"] = checks_json(r);
+  j["invariant_checks"] = checks_of_bodies(r);
   return j;
 }
 

@@ -51,7 +51,7 @@ void element_count(Faults& faults, const std::string& path, const int& elements,
 }
 
 void order(Faults& faults, const std::string& path, const int& value, std::string_view) {
-  from_to(faults, path, value, 1, 12, "");
+  from_to(faults, path, value, 1, highest_beam_order, "");
 }
 
 void mesh_accuracy(Faults& faults, const std::string& path, const double& value, std::string_view) {

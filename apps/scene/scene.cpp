@@ -135,13 +135,6 @@ Scene with_joints(Scene scene) {
   return scene;
 }
 
-double OrbitScene::rate() const {
-  constexpr double mu = 3.986004418e14;     // [m^3/s^2], WGS 84
-  constexpr double equatorial = 6378137.0;  // [m], WGS 84
-  const double radius = (equatorial + altitude) / (1 - eccentricity);
-  return std::sqrt(mu / (radius * radius * radius));
-}
-
 namespace {
 
 Scene scene_of_table(const Value& root, Reading& reading) {

@@ -82,8 +82,8 @@ struct HingeScene {
   bool loads = false;      // are its force and torque outputs?
 };
 
-/// Orbit of the reference point: for attitude in the local-vertical local-horizontal frame (z to the Earth, y against
-/// the orbit's normal), with which the inertial axes are aligned at t = 0, and for gravity.
+/// Orbit of the reference point, for gravity and for attitude in the local-vertical local-horizontal frame: z to the
+/// Earth, y against the orbit's normal. The inertial axes are those of this frame at t = 0.
 struct OrbitScene {
   double altitude = 405e3;       // of the perigee, above the equatorial radius [m]
   double eccentricity = 0;       // [0, 1)

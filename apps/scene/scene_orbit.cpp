@@ -6,6 +6,12 @@
 
 namespace flexboom {
 
+double OrbitScene::rate() const {
+  const Planet earth;
+  const double a = (earth.radius + altitude) / (1 - eccentricity);
+  return std::sqrt(earth.mu / (a * a * a));
+}
+
 Orbit orbit_of(const Scene& scene) {
   const OrbitScene& o = *scene.orbit;
   Planet earth;

@@ -7,7 +7,6 @@
 #include "apps/simulate/flights_ahead.hpp"
 #include "apps/simulate/late_vibrations.hpp"
 #include "fem/base/check.hpp"
-#include "reduction/exports/integrals.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -163,21 +162,13 @@ struct Measuring {
     for (OutputErrors& o : budget.outputs) {
       const auto d = std::ranges::find(finding.differences, o.name, &OutputDifference::name);
       const bool is_known = d != finding.differences.end();
-      const double error = is_known ? finding.factor * d->error : 0, before = worst_part(o);
+      const double error = is_known ? finding.factor * d->error : 0, before = o.largest_part().second;
       if (is_known) o.scale = std::max(o.scale, d->scale), o.size = std::max(o.size, d->size);
       o.*part = error + (o.scale > 0 && more ? more(o) / o.scale : 0);
       if (error > before) o.when = d->time;
       most = std::max(most, o.*part);
     }
     return most;
-  }
-
- private:
-  static double worst_part(const OutputErrors& o) {
-    double r = 0;
-    for (const double error : {o.discretisation, o.truncation, o.time, o.linearisation})
-      if (error > r) r = error;
-    return r;
   }
 };
 

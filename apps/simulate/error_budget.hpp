@@ -19,9 +19,9 @@ struct Settling {
   double balance = std::numeric_limits<double>::infinity();  // the largest energy balance
 };
 
-/// Repeats a run ten times tighter until its outputs change no more than is bearable, and what enters and leaves is
-/// what its energies say: steps that are right for the outputs may leave powers out. `run` is then the last but one,
-/// `flown` has the tolerance of its integrator, and `plan` says so. Returns the last differences.
+/// Repeats a run ten times tighter until its outputs change no more than is bearable, and its energies balance: steps
+/// that are right for the outputs may leave powers out. `run` is then the last but one. `flown` has the tolerance of
+/// its integrator, and `plan` says so. Returns the last differences.
 /// @throws InputError, NumericalError as run_scene.
 std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors&, Settling, const RunHooks&,
                                                 std::vector<std::string>& plan);

@@ -1,7 +1,6 @@
 #include "apps/simulate/field_error.hpp"
 
 #include "dynamics/environment/gravity_field.hpp"
-#include "reduction/exports/integrals.hpp"
 
 #include <Eigen/Eigenvalues>
 

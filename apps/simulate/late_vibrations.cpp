@@ -1,6 +1,7 @@
 #include "apps/simulate/late_vibrations.hpp"
 
 #include "apps/base/deflection.hpp"
+#include "apps/simulate/output_errors.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,18 +17,15 @@ using Eigen::Index;
 
 namespace {
 
-constexpr Index most_samples = 20000;  // of a deflection
-
 /// How late the vibrations of a body are at each output [s].
 ArrayXd lag_of(const PreparedBody& p, const OutputTable& outputs) {
-  const Index rows = outputs.values.rows(), stride = rows / most_samples + 1;
+  const Index rows = outputs.values.rows(), stride = rows / most_deflections + 1;
   ArrayXd lag = ArrayXd::Zero(rows);
   if (p.body.n() == 0) return lag;
   const Deflection deflection(p.body);
-  const auto first = std::ranges::find(outputs.names, p.body.name + ".q1") - outputs.names.begin();
+  const Eigen::MatrixXd q = coordinates_of(outputs, p.body);
   const auto rate = [&](Index row) {
-    const Eigen::VectorXd q = outputs.values.row(row).segment(first, p.body.n()).transpose();
-    return std::pow(deflection.largest(q) / deflection.length(), 2);
+    return std::pow(deflection.largest(q.row(row).transpose()) / deflection.length(), 2);
   };
   for (Index row = 0; row + 1 < rows; row += stride) {
     const Index next = std::min(row + stride, rows - 1);

@@ -1,6 +1,7 @@
 #include "apps/simulate/output_errors.hpp"
 
 #include "dynamics/numerics/rotation.hpp"
+#include "fem/base/check.hpp"
 
 #include <fmt/format.h>
 
@@ -159,23 +160,29 @@ double largest(const std::vector<OutputDifference>& differences) {
   return r;
 }
 
+Eigen::MatrixXd coordinates_of(const OutputTable& outputs, const ReducedBody& body) {
+  if (body.n() == 0) return Eigen::MatrixXd(outputs.values.rows(), 0);
+  const auto first = std::ranges::find(outputs.names, body.name + ".q1") - outputs.names.begin();
+  require(first + body.n() <= outputs.values.cols(), fmt::format("outputs have no coordinates of body {}", body.name));
+  return outputs.values.middleCols(first, body.n());
+}
+
+std::pair<std::string_view, double> ErrorParts::largest_part() const {
+  std::pair<std::string_view, double> most;
+  for (const auto& [name, part] : error_parts)
+    if (this->*part > most.second) most = {name, this->*part};
+  return most;
+}
+
 std::string description(const OutputErrors& o) {
-  const std::array<std::pair<std::string_view, double>, 4> parts = {{{"discretisation", o.discretisation},
-                                                                     {"truncation", o.truncation},
-                                                                     {"time", o.time},
-                                                                     {"linearisation", o.linearisation}}};
-  std::string_view most;
-  double size = 0;
-  for (const auto& [name, error] : parts)
-    if (error > size) most = name, size = error;
-  const std::string part = most.empty() ? "" : fmt::format(", most of it {}", most);
-  return fmt::format("{} at t = {:.6g} s{}", o.name, o.when, part);
+  const std::string_view most = o.largest_part().first;
+  return fmt::format("{} at t = {:.6g} s{}", o.name, o.when, most.empty() ? "" : fmt::format(", most of it {}", most));
 }
 
 double OutputErrors::known() const {
   OutputErrors o = *this;
-  for (double* part : {&o.discretisation, &o.truncation, &o.time, &o.linearisation})
-    if (std::isnan(*part)) *part = 0;
+  for (const auto& [name, part] : error_parts)
+    if (std::isnan(o.*part)) o.*part = 0;
   return o.total();
 }
 

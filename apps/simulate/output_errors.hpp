@@ -2,11 +2,14 @@
 
 #include "apps/scene/wanted_accuracy.hpp"
 #include "dynamics/events/flight.hpp"
+#include "reduction/body/reduced_body.hpp"
 
 #include <Eigen/Core>
 
+#include <array>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 /// How far the outputs of one run are from those of another. A vector is one output: "hub.rotation" has three columns.
@@ -43,12 +46,16 @@ struct OutputDifference {
   double size = 0;   // the largest value of the output over time [its unit]
 };
 
-/// Over the outputs that both tables have and that are wanted (all but lvlh when `wanted` is empty): max over time of
-/// |a - b|, by the largest |b| over time. With floors that is no less than what tolerance makes of an absolute error
-/// and of round-off: 1e-14 of a radian, of the scene's length, of that times the largest rate or force, of the rate
-/// that all of the kinetic energy would give the least inertia (100 rad/s at most), or of the largest output of the
-/// same unit. An output with an accuracy of its own (as wanted_output) is scaled so that its error is `tolerance` where
-/// it has that accuracy.
+/// Over the outputs that both tables have and that are wanted (all but lvlh when `wanted` is empty): the largest
+/// |a - b| over time, by the largest |b| over time.
+///
+/// With floors that size is no less than an absolute error, or round-off, divided by the tolerance. Round-off is 1e-14
+/// of the largest of these:
+/// - a radian, the scene's length, or that times the largest rate or force;
+/// - the rate that all of the kinetic energy would give the least inertia, 100 rad/s at most;
+/// - the largest output of the same unit.
+///
+/// An output with an accuracy of its own (as wanted_output) has the error `tolerance` where it has that accuracy.
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted, const OutputFloors& = {});
 
@@ -63,13 +70,25 @@ struct ReferenceCheck {
   std::string missing;  // why it has none
 };
 
+/// Where errors come from, each relative to the scale of its output.
+struct ErrorParts {
+  double discretisation = unknown, truncation = unknown, time = unknown, linearisation = unknown;
+
+  /// The name and the size of the largest that is known; "" and 0 where none is.
+  std::pair<std::string_view, double> largest_part() const;
+};
+inline constexpr std::array<std::pair<std::string_view, double ErrorParts::*>, 4> error_parts = {
+    {{"discretisation", &ErrorParts::discretisation},
+     {"truncation", &ErrorParts::truncation},
+     {"time", &ErrorParts::time},
+     {"linearisation", &ErrorParts::linearisation}}};
+
 /// Errors of one output, each relative to its scale. What was not measured is unknown (NaN).
-struct OutputErrors {
+struct OutputErrors : ErrorParts {
   std::string name;
   double scale = 0;  // [its unit]
-  double discretisation = unknown, truncation = unknown, time = unknown, linearisation = unknown;
-  double when = 0;  // the largest of them is worst [s]
-  double size = 0;  // as OutputDifference [its unit]
+  double when = 0;   // the largest of them is worst [s]
+  double size = 0;   // as OutputDifference [its unit]
 
   /// Elastic coordinates have the meaning of their own basis: nothing is left out of them, no mesh is finer.
   bool is_of_its_basis() const { return name.ends_with(".q"); }
@@ -78,17 +97,19 @@ struct OutputErrors {
   double known() const;
 };
 
+/// Deflections of a body are looked at in so many rows at most.
+inline constexpr Eigen::Index most_deflections = 20000;
+
+/// The elastic coordinates of a body, n per row.
+Eigen::MatrixXd coordinates_of(const OutputTable&, const ReducedBody&);
+
 /// Its name, when it is worst, and the largest part where that is known: "hub.rotation at t = 3.2 s, most of it
 /// truncation".
 std::string description(const OutputErrors&);
 
 /// Four separate errors of a run (README of apps: what each is compared with), each the largest over the outputs
 /// wanted. What was not measured is unknown (NaN), and then so is the total.
-struct ErrorBudget {
-  double discretisation = unknown;
-  double truncation = unknown;
-  double time = unknown;
-  double linearisation = unknown;
+struct ErrorBudget : ErrorParts {
   std::vector<OutputErrors> outputs;
   std::vector<std::string> missing;  // which part was not measured and why, one line each
   bool measured = false;             // false: the repeats were not run, or not to their end

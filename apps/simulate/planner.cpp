@@ -42,8 +42,7 @@ constexpr double nearly_all = 0.85;  // of the candidates: where so many are nee
 
 /// The largest |q| of every coordinate of a body.
 VectorXd amplitudes(const Run& run, const ReducedBody& body) {
-  const auto first = std::ranges::find(run.outputs.names, body.name + ".q1") - run.outputs.names.begin();
-  return run.outputs.values.middleCols(first, body.n()).cwiseAbs().colwise().maxCoeff().transpose();
+  return coordinates_of(run.outputs, body).cwiseAbs().colwise().maxCoeff().transpose();
 }
 
 /// "bending_y 2, torsion 1" of kinds.

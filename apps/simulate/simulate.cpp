@@ -63,14 +63,14 @@ namespace {
 /// Over the outputs, of long lists over some.
 std::vector<Bending> bending_of(const Run& run) {
   std::vector<Bending> bending;
-  const Eigen::Index stride = run.outputs.values.rows() / 20000 + 1;
+  const Eigen::Index stride = run.outputs.values.rows() / most_deflections + 1;
   for (const PreparedBody& p : run.bodies) {
     Bending& most = bending.emplace_back();
     if (p.body.n() == 0) continue;
     const Deflection deflection(p.body);
-    const auto first = std::ranges::find(run.outputs.names, p.body.name + ".q1") - run.outputs.names.begin();
-    for (Eigen::Index row = 0; row < run.outputs.values.rows(); row += stride) {
-      const double size = deflection.largest(run.outputs.values.row(row).segment(first, p.body.n()).transpose());
+    const Eigen::MatrixXd q = coordinates_of(run.outputs, p.body);
+    for (Eigen::Index row = 0; row < q.rows(); row += stride) {
+      const double size = deflection.largest(q.row(row).transpose());
       if (size > most.size) most = {size, size / deflection.length(), run.outputs.values(row, 0)};
     }
   }

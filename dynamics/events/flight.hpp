@@ -45,9 +45,9 @@ struct FlightOptions {
   double start = 0;           // [s]
   double duration = 10;       // [s], the time at the end
   double output_step = 0.01;  // [s]
-  /// A hinge whose rate on both sides of its stop stays below this fraction of its largest rate so far has settled: its
-  /// crossings are no longer located (its stop counts as open) until the rate doubles. Zero: never. Negative: a
-  /// hundredth of the tolerance, no less than the tolerance or 1e-10.
+  /// A hinge has settled when its rate on both sides of its stop stays below this fraction of its largest rate so far.
+  /// Its crossings are then no longer located, and its stop counts as open, until its rate or its gap is twice what
+  /// rest allows. Zero: never. Negative: a hundredth of the tolerance, no less than the tolerance or 1e-10.
   double settle = -1;
   /// Per joint: of a flight that this one goes on. Empty: none was met.
   std::vector<StopHistory> stops{};

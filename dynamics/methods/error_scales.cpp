@@ -170,52 +170,57 @@ void ErrorScales::set_floors(const VectorXd& y0) {
     if (j.velocity >= 0) beside.segment<3>(j.velocity).setZero();
   const double energy = tree_.balance(0, beside).shaking();
   floor_.tail(l.size - l.dissipated).setConstant(std::max(energy, of_size));
-  // A quaternion's entries are near 1: less than its round-off can not be asked for.
-  const double least_turn = 1e-14 / error_.tolerance;
-  if (energy > 1e-30) {
-    const auto limit = [&](int i, double size) {
-      bound_[i] = size;
-      floor_[i] = std::min(floor_[i], of_energy * size);
-    };
-    double longest = 1e-3;
-    for (size_t i = 0; i < l.joints.size(); ++i) {
-      if (l.joints[i].omega >= 0)
-        if (const double spin = y0.segment<3>(l.joints[i].omega).norm(); spin > 0)
-          longest = std::max(longest, 1 / spin);
-      const Joint& joint = scene.joints[i];
-      if (!(period_[i] > 0) || !(joint.mechanism.stiffness > 0)) continue;
-      const double k = joint.mechanism.stiffness, rate = stop_of(joint, i, carried_body(tree_, i)).spring_rate;
-      longest = std::max(longest, 1 / rate);
-      limit(l.joints[i].scalar, std::max(std::abs(y0[l.joints[i].scalar]), std::sqrt(2 * energy / k)));
-      limit(l.rate(l.joints[i].scalar), std::sqrt(2 * energy / k) * rate);
-    }
-    for (size_t b = 0; b < l.q.size(); ++b) {
-      const ReducedBody& body = scene.bodies[b];
-      for (int k = 0; k < body.n(); ++k) {
-        if (body.Ke(k, k) > 0) limit(l.q[b] + k, std::sqrt(2 * energy / body.Ke(k, k)));
-        limit(l.rate(l.q[b] + k), std::sqrt(2 * energy / body.Me(k, k)));
-      }
-    }
-    for (size_t i = 0; i < l.joints.size(); ++i) {
-      const TreeLayout::Joint& j = l.joints[i];
-      if (j.position < 0) continue;
-      const ReducedBody& body = carried_body(tree_, i);
-      const double turn = std::sqrt(2 * energy / (body.J0.trace() / 3)), v = std::sqrt(2 * energy / body.m);
-      for (int k = 0; k < 3; ++k)
-        limit(j.omega + k, turn), limit(j.velocity + k, v), limit(j.position + k, v * longest);
-      for (int k = 0; k < 4; ++k) limit(j.attitude + k, std::min(1.0, turn * longest));
-    }
-  }
-  if (!(energy > 1e-30)) {
+  constexpr double none = 1e-30;
+  if (energy > none) {
+    limit_by_energy(energy, y0);
+  } else {
     highest_floor_ = floor_;
     for (size_t b = 0; b < l.q.size(); ++b) {
       floor_.segment(l.q[b], scene.bodies[b].n()) *= at_first;
       floor_.segment(l.rate(l.q[b]), scene.bodies[b].n()) *= at_first;
     }
   }
+  // A quaternion's entries are near 1: less than its round-off can not be asked for.
+  const double least_turn = 1e-14 / error_.tolerance;
   for (const TreeLayout::Joint& j : l.joints)
     if (j.attitude >= 0) floor_.segment<4>(j.attitude) = floor_.segment<4>(j.attitude).cwiseMax(least_turn);
   error_.scale = floor_;
+}
+
+/// By the values that so much energy [J] could give each state.
+void ErrorScales::limit_by_energy(double energy, const VectorXd& y0) {
+  const TreeLayout& l = tree_.layout();
+  const Multibody& scene = tree_.scene();
+  const auto limit = [&](int i, double size) {
+    bound_[i] = size;
+    floor_[i] = std::min(floor_[i], of_energy * size);
+  };
+  double longest = 1e-3;
+  for (size_t i = 0; i < l.joints.size(); ++i) {
+    if (l.joints[i].omega >= 0)
+      if (const double spin = y0.segment<3>(l.joints[i].omega).norm(); spin > 0) longest = std::max(longest, 1 / spin);
+    const Joint& joint = scene.joints[i];
+    if (!(period_[i] > 0) || !(joint.mechanism.stiffness > 0)) continue;
+    const double k = joint.mechanism.stiffness, rate = spring_rate_[i];
+    longest = std::max(longest, 1 / rate);
+    limit(l.joints[i].scalar, std::max(std::abs(y0[l.joints[i].scalar]), std::sqrt(2 * energy / k)));
+    limit(l.rate(l.joints[i].scalar), std::sqrt(2 * energy / k) * rate);
+  }
+  for (size_t b = 0; b < l.q.size(); ++b) {
+    const ReducedBody& body = scene.bodies[b];
+    for (int k = 0; k < body.n(); ++k) {
+      if (body.Ke(k, k) > 0) limit(l.q[b] + k, std::sqrt(2 * energy / body.Ke(k, k)));
+      limit(l.rate(l.q[b] + k), std::sqrt(2 * energy / body.Me(k, k)));
+    }
+  }
+  for (size_t i = 0; i < l.joints.size(); ++i) {
+    const TreeLayout::Joint& j = l.joints[i];
+    if (j.position < 0) continue;
+    const ReducedBody& body = carried_body(tree_, i);
+    const double turn = std::sqrt(2 * energy / (body.J0.trace() / 3)), v = std::sqrt(2 * energy / body.m);
+    for (int k = 0; k < 3; ++k) limit(j.omega + k, turn), limit(j.velocity + k, v), limit(j.position + k, v * longest);
+    for (int k = 0; k < 4; ++k) limit(j.attitude + k, std::min(1.0, turn * longest));
+  }
 }
 
 }  // namespace flexboom

@@ -9,8 +9,8 @@
 
 namespace flexboom {
 
-/// What the error of each state is measured against: the largest value so far of the group that it belongs to, and
-/// never less than a floor, so that a state that starts at zero has a size.
+/// What the error of each state is measured against: the largest value so far of the group that it belongs to. A floor
+/// gives a state that starts at zero a size.
 class ErrorScales {
  public:
   /// rescale: what `restart` is told to forget is forgotten.
@@ -34,6 +34,7 @@ class ErrorScales {
   template <class Each>
   void for_each_size(const Eigen::VectorXd& y, const Each& each) const;
   void set_floors(const Eigen::VectorXd& y0);
+  void limit_by_energy(double energy, const Eigen::VectorXd& y0);
   void raise_floors(const Eigen::VectorXd& y);
 
   const Tree& tree_;

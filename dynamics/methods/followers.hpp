@@ -10,15 +10,15 @@
 
 namespace flexboom {
 
-/// What follows x within a step of exponential collocation: attitudes, the motion of the mass centre of what floats and
-/// with it the place of its root, energies.
+/// What follows x within a step of exponential collocation: attitudes, energies, and the mass centre of what floats,
+/// with it the place of its root.
 class Followers {
  public:
   Followers(SplitProblem&, const ErrorScale&);
 
-  /// From the next start on, powers are `of_x` x and a remainder (a row per energy), `of_z` z the same of the modes:
-  /// what of them vibrates with x is integrated as x is, the remainder by its polynomial. In steps where the remainder
-  /// is rougher than the whole, the polynomial is that of the whole. Empty: all is remainder.
+  /// From the next start on, powers are `of_x` x and a remainder, a row per energy; `of_z` z is the same of the modes.
+  /// What vibrates with x is integrated as x is, the remainder by its polynomial. In steps where the remainder is
+  /// rougher than the whole, the polynomial is that of the whole. Empty: all is remainder.
   void split_powers(const Eigen::MatrixXd& of_x, const Eigen::MatrixXd& of_z) {
     power_of_x_ = of_x, power_of_z_ = of_z;
   }

@@ -12,20 +12,12 @@ using Eigen::Index;
 
 double StopSearch::first_crossing(const CollocatedStep& step, std::span<const char> contact,
                                   std::span<const double> levels, std::span<int> crossed) {
-  roots_.clear();
-  double end = 1;
-  for (size_t i = 0; i < levels.size(); ++i) {
-    if (!std::isfinite(levels[i])) continue;
-    const double root = first_crossing(step, static_cast<int>(i), levels[i], contact[i] ? 1 : -1, end);
-    if (root > 1) continue;
-    roots_.emplace_back(static_cast<int>(i), root);
-    end = std::min(end, root);
-  }
-  // Booms that are alike cross together.
-  const double same = (4e-16 * std::abs(step.start) + 1e-14 * step.length) / step.length;
-  for (const auto& [i, root] : roots_)
-    if (root <= end + same) crossed[static_cast<size_t>(i)] = contact[static_cast<size_t>(i)] ? -1 : 1;
-  return end;
+  crossings_.clear();
+  for (size_t i = 0; i < levels.size(); ++i)
+    if (std::isfinite(levels[i]))
+      crossings_.add(i, first_crossing(step, static_cast<int>(i), levels[i], contact[i] ? 1 : -1, crossings_.end()));
+  crossings_.mark(step.start, step.length, contact, crossed);
+  return crossings_.end();
 }
 
 namespace {

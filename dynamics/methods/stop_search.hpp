@@ -68,7 +68,7 @@ class StopSearch {
                             const Places&);
 
   std::vector<SplitLayout::Coordinate> gaps_;  // of each stop
-  std::vector<std::pair<int, double>> roots_;
+  FirstCrossings crossings_;
   std::vector<Fast> fast_;
   Eigen::VectorXd z_, shares_, rates_;  // shares: real parts, then imaginary parts; rates: squares
   GridPoint scratch_;

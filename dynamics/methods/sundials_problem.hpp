@@ -76,25 +76,18 @@ class StepCrossings {
   double first(const Problem& problem, double t, double length, const double* y, const StateAt& state_at,
                std::span<int> crossed) {
     std::fill(crossed.begin(), crossed.end(), 0);
-    roots_.clear();
-    double end = 1;
+    crossings_.clear();
     for (size_t i = 0; i < levels_.size(); ++i) {
       if (!std::isfinite(levels_[i])) continue;
       const auto at = [&](double c) { return clearance(problem, t + c * length, state_at(c), i, c, length); };
       Clearance from = from_[i];
       from.slope *= length;
       const double resolution = 4e-16 * std::max(1.0, std::abs(t) / length);
-      double root = crossing_between(at, from, clearance(problem, t + length, y, i, 1, length), resolution);
-      if (root == crossed_from_the_start) root = 0;
-      if (root > 1) continue;
-      roots_.emplace_back(i, root);
-      end = std::min(end, root);
+      const double root = crossing_between(at, from, clearance(problem, t + length, y, i, 1, length), resolution);
+      crossings_.add(i, root == crossed_from_the_start ? 0 : root);
     }
-    // Booms that are alike cross together.
-    const double same = (4e-16 * std::abs(t) + 1e-14 * length) / length;
-    for (const auto& [i, root] : roots_)
-      if (root <= end + same) crossed[i] = problem.contacts()[i] ? -1 : 1;
-    return end;
+    crossings_.mark(t, length, problem.contacts(), crossed);
+    return crossings_.end();
   }
 
  private:
@@ -111,7 +104,7 @@ class StepCrossings {
 
   std::vector<double> levels_;
   std::vector<Clearance> from_;  // slopes per second
-  std::vector<std::pair<size_t, double>> roots_;
+  FirstCrossings crossings_;
 };
 
 }  // namespace flexboom::sundials

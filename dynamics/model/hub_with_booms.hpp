@@ -23,7 +23,7 @@ struct Appendage {
   Hinge hinge;
 };
 
-/// Shorthand of the first scene: body 0 is the hub on a free joint of its name, joint 0; then the booms and their
+/// A hub that carries booms on hinges: body 0 is the hub on a free joint of its name, joint 0; then the booms and their
 /// hinges. Without a hub the booms hang on the inertial frame.
 /// @throws InputError when the directions of a hinge are not unit vectors normal to each other.
 Multibody hub_with_booms(std::optional<ReducedBody> hub, std::vector<Appendage>,

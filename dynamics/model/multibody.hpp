@@ -42,7 +42,7 @@ struct Joint {
   JointKind kind = JointKind::hinge;
   Place a, b;                // a on the body nearer to the inertial frame
   HingeMechanism mechanism;  // of a hinge (about +z of a, on b) or a slider (along +z): spring, damper, stop
-  std::vector<TimeFunction> prescribed;  // empty, or one per freedom: the motion is given, its torque is an output
+  std::vector<TimeFunction> prescribed;  // empty, or one per scalar: the motion is given, its torque is an output
   bool closes_loop = false;              // not part of the tree: enforced by multipliers
   JointLaw law{};                        // beside the mechanism, of a hinge or a slider
 };

@@ -21,9 +21,9 @@ struct WheelTorques {
   double end = 0;                    // of the last turn [s]
 };
 
-/// What turns a rigid body of inertia J about the mass centre (body axes; all of it that is not a rotor's inertia about
-/// its own axis) one turn after another, from rest with wheels at rest: the momentum of body and wheels stays zero, so
-/// the rotors take -J phi_dot axis and gyroscopic torques cancel, whatever the axis.
+/// What turns a rigid body one turn after another, from rest with wheels at rest. J: its inertia about the mass centre,
+/// body axes, less what the rotors have about their own axes. The momentum of body and wheels stays zero, so the rotors
+/// take -J phi_dot axis, and gyroscopic torques cancel whatever the axis.
 /// @throws InputError for turns that overlap, an axis that is not unit, or an inertia that is not symmetric.
 WheelTorques wheel_torques(const Eigen::Matrix3d& J, const std::vector<WheelTurn>&);
 

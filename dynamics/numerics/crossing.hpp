@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <span>
+#include <utility>
+#include <vector>
 
 namespace flexboom {
 
@@ -101,5 +105,32 @@ double crossing_between(const At& at, const Clearance& from, const Clearance& to
   }
   return no_crossing;
 }
+
+/// What is crossed first within a step. Booms that are alike cross together.
+class FirstCrossings {
+ public:
+  void clear() {
+    roots_.clear();
+    end_ = 1;
+  }
+  /// `root`: share of the step; beyond 1 there is none.
+  void add(std::size_t i, double root) {
+    if (root > 1) return;
+    roots_.emplace_back(i, root);
+    end_ = std::min(end_, root);
+  }
+  /// The share of the step that ends at the first crossing, or 1.
+  double end() const { return end_; }
+  /// crossed[i]: +1 for what is open and crossed there, -1 for what is closed, in a step of `length` from `start` [s].
+  void mark(double start, double length, std::span<const char> closed, std::span<int> crossed) const {
+    const double same = (4e-16 * std::abs(start) + 1e-14 * length) / length;
+    for (const auto& [i, root] : roots_)
+      if (root <= end_ + same) crossed[i] = closed[i] ? -1 : 1;
+  }
+
+ private:
+  std::vector<std::pair<std::size_t, double>> roots_;
+  double end_ = 1;
+};
 
 }  // namespace flexboom

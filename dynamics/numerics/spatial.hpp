@@ -69,7 +69,7 @@ auto operator*(const Sym3<S>& a, const Vec3<T>& b) {
   return Vec3<decltype(a.xx * b.x)>{a.xx * b.x + a.xy * b.y + a.zx * b.z, a.xy * b.x + a.yy * b.y + a.yz * b.z,
                                     a.zx * b.x + a.yz * b.y + a.zz * b.z};
 }
-/// a -= s b c^T + ..., for b = s^-1 c parallel: the symmetric dyad s v v^T.
+/// a -= s v v^T.
 template <class T>
 void subtract_dyad(Sym3<T>& a, const T& s, const Vec3<T>& v) {
   const Vec3<T> sv = s * v;

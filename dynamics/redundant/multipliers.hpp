@@ -13,8 +13,8 @@
 
 namespace flexboom {
 
-/// Where a body is and how it moves. Positions are relative to the reference point, in inertial axes; the quaternion
-/// (w, x, y, z) turns BRF -> inertial.
+/// Where a body is and how it moves, inertial axes. In an orbit positions are relative to the reference point. The
+/// quaternion (w, x, y, z) turns BRF -> inertial.
 struct BodyState {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      // R [m]
   Eigen::Vector4d attitude = Eigen::Vector4d(1, 0, 0, 0);  // unit

@@ -1,6 +1,6 @@
 #pragma once
 
-// The equations of one flexible body on a hinge, written once for constants C (of one body, or of four side by side)
+// The equations of one flexible body, written once for constants C (of one body, or of four side by side)
 // and a scalar T: C, or C with derivatives (README, "Equations of motion"). Internal to `dynamics`.
 
 #include "dynamics/environment/gravity_terms.hpp"
@@ -60,7 +60,7 @@ struct Rows {
   }
 };
 
-/// Constants of one appendage, packed for the inner loop. Arrays over modes are contiguous.
+/// Constants of one body, packed for the inner loop. Arrays over modes are contiguous.
 template <class C>
 struct BodyOf {
   int n = 0;
@@ -96,15 +96,15 @@ struct BodyScratch {
   explicit BodyScratch(size_t n = 0, size_t rows = 0) : Cr(n), Gw(n), b(n), g(n), J2_q(rows) {}
 };
 
-/// Mass matrix (symmetric, in blocks of translation and rotation) and force of the hub with everything condensed to it,
-/// hub axes.
+/// Mass matrix (symmetric, in blocks of translation and rotation) and force of a body with everything condensed to it
+/// that hangs on it, axes of the body.
 template <class T>
-struct HubSystem {
+struct ArticulatedInertia {
   Sym3<T> tt, ww;
   Mat3<T> tw;
   Vec3<T> ft, fw;
 
-  HubSystem& operator+=(const HubSystem& b) {
+  ArticulatedInertia& operator+=(const ArticulatedInertia& b) {
     tt += b.tt, ww += b.ww, ft += b.ft, fw += b.fw;
     for (size_t i = 0; i < 3; ++i) tw.row[i] += b.tw.row[i];
     return *this;
@@ -230,10 +230,9 @@ void modal_forces(const BodyOf<C>& body, const Vec3<T>& w, const T* q, const T* 
   add_inertial_forces(body, w, q_dot, s, s.b.data());
 }
 
-/// Solves the 6 x 6 system of the hub by two 3 x 3 Cholesky factorisations in blocks (LDL^T of the whole, unrolled by a
-/// loop).
+/// Accelerations of a body that nothing holds, by LDL^T of its 6 x 6 system.
 template <class T>
-void solve_hub(const HubSystem<T>& h, Vec3<T>& a, Vec3<T>& alpha) {
+void solve_free_body(const ArticulatedInertia<T>& h, Vec3<T>& a, Vec3<T>& alpha) {
   const Mat3<T>& c = h.tw;
   T M[6][6] = {{h.tt.xx},
                {h.tt.xy, h.tt.yy},

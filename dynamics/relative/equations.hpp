@@ -14,7 +14,7 @@ template <class T>
 void condense_held(const Link& link, LinkScratch<T>& s) {
   const equations::Body& b = link.body;
   const auto n = static_cast<size_t>(b.n);
-  HubSystem<T>& I = s.I;
+  ArticulatedInertia<T>& I = s.I;
   for (size_t k = 0; k < n; ++k) {
     s.C[k] = {link.second_order ? s.second_order.Ct[k] : equations::lift<T>(b.Ct[k]), s.modes.Cr[k]};
     s.v[k] = s.modes.b[k];
@@ -22,7 +22,7 @@ void condense_held(const Link& link, LinkScratch<T>& s) {
       s.M[k * n + l] = link.second_order ? s.second_order.Me[k * n + l] : T(b.Me[k * n + l]);
   }
   for (size_t i = 0; i < s.hung.size(); ++i) {
-    const HubSystem<T>& W = s.hung[i];
+    const ArticulatedInertia<T>& W = s.hung[i];
     const Vec3<T>& r = s.place[i];
     for (size_t k = 0; k < n; ++k) {
       const Twist<T>& U = s.U[i * n + k];
@@ -104,7 +104,7 @@ void condense_link(const Link& link, const T* y, LinkScratch<T>& s, bool forces)
 
 /// I times the unit motion of a freedom.
 template <class T>
-Twist<T> motion_column(Freedom freedom, const Vec3<T>& turn_z_of_a, const HubSystem<T>& I) {
+Twist<T> motion_column(Freedom freedom, const Vec3<T>& turn_z_of_a, const ArticulatedInertia<T>& I) {
   const Mat3<T>& c = I.tw;
   switch (freedom) {
     case Freedom::x:
@@ -184,7 +184,7 @@ T mechanism_load(const Link& link, const T* y, const Instant::Drive& drive, cons
 /// Eliminates freedom i of the joint, which has this force along it.
 template <class T>
 void eliminate_freedom(Freedom freedom, int i, const T& load, LinkScratch<T>& s) {
-  HubSystem<T> I = s.I;
+  ArticulatedInertia<T> I = s.I;
   Eliminated<T> e;
   e.U = motion_column(freedom, s.turn_z_of_a, I);
   e.inverse_D = T(1.0) / along(freedom, s.turn_z_of_a, e.U);
@@ -217,7 +217,7 @@ Twist<T> joint_load(const LinkScratch<T>& s) {
 /// Adds what hangs on the parent through the link's joint.
 template <class T>
 void hand_to_parent(const Link& link, LinkScratch<T>& s, LinkScratch<T>& parent) {
-  HubSystem<T> I = s.I;
+  ArticulatedInertia<T> I = s.I;
   const Twist<T> f = I * s.bias;
   I.ft -= f.t;
   I.fw -= f.w;
@@ -304,7 +304,7 @@ void release_link(const Model& model, const Link& link, const LinkScratch<T>* pa
   }
   const JointType& type = joint_type(link.kind);
   if (link.kind == JointKind::free) {
-    equations::solve_hub(s.I, s.handle.t, s.handle.w);
+    equations::solve_free_body(s.I, s.handle.t, s.handle.w);
     const Vec3<T> alpha = s.handle.w - s.base.w;
     y_dot[link.omega] = alpha.x, y_dot[link.omega + 1] = alpha.y, y_dot[link.omega + 2] = alpha.z;
     const Vec3<T> a = transposed_product(s.a.E, s.A * (s.handle.t - s.base.t));

@@ -11,7 +11,7 @@
 namespace flexboom::tree {
 
 template <class T>
-Twist<T> operator*(const HubSystem<T>& I, const Twist<T>& a) {
+Twist<T> operator*(const ArticulatedInertia<T>& I, const Twist<T>& a) {
   return {I.tt * a.t + I.tw * a.w, transposed_product(I.tw, a.t) + I.ww * a.w};
 }
 
@@ -20,9 +20,9 @@ T dot(const Twist<T>& a, const Twist<T>& b) {
   return dot(a.t, b.t) + dot(a.w, b.w);
 }
 
-/// I -= a b^T with a parallel to I^-1-symmetric b: the product is symmetric.
+/// I -= a b^T, a being a multiple of b: the product is symmetric.
 template <class T>
-void subtract_outer(HubSystem<T>& I, const Twist<T>& a, const Twist<T>& b) {
+void subtract_outer(ArticulatedInertia<T>& I, const Twist<T>& a, const Twist<T>& b) {
   I.tt.xx -= a.t.x * b.t.x, I.tt.yy -= a.t.y * b.t.y, I.tt.zz -= a.t.z * b.t.z;
   I.tt.xy -= a.t.x * b.t.y, I.tt.yz -= a.t.y * b.t.z, I.tt.zx -= a.t.z * b.t.x;
   I.ww.xx -= a.w.x * b.w.x, I.ww.yy -= a.w.y * b.w.y, I.ww.zz -= a.w.z * b.w.z;
@@ -32,8 +32,8 @@ void subtract_outer(HubSystem<T>& I, const Twist<T>& a, const Twist<T>& b) {
 
 /// The inertia and force of I in other axes (A: of I -> those) and about another origin (arm: from there to that of I).
 template <class T, class R>
-HubSystem<T> shifted(const Mat3<T>& A, const R& arm, const HubSystem<T>& I) {
-  HubSystem<T> r;
+ArticulatedInertia<T> shifted(const Mat3<T>& A, const R& arm, const ArticulatedInertia<T>& I) {
+  ArticulatedInertia<T> r;
   const Sym3<T>& TT = r.tt = equations::rotate(A, I.tt);
   const Mat3<T> TW = equations::rotate(A, I.tw);
   r.ft = A * I.ft;
@@ -157,7 +157,7 @@ void add_inertia(const C& mass, const equations::Inertia<T>& inertia, const std:
   s.J = inertia.J;
   const Vec3<T>& c = s.mc;
   const T zero(0.0), m(mass);
-  HubSystem<T> I = s.I;  // a copy, so that the compiler may keep it in registers
+  ArticulatedInertia<T> I = s.I;  // a copy, so that the compiler may keep it in registers
   I.tt += Sym3<T>{m, m, m, zero, zero, zero};
   I.ww += inertia.J;
   I.tw.row[0] += Vec3<T>{zero, c.z, -c.y};  // -tilde(mc)
@@ -210,7 +210,7 @@ void eliminate_modes(const InverseOfMe<C>& inverse, const std::vector<Vec3<C>>& 
                      const Sym3<C>* Ctt, LinkScratch<T>& s) {
   const size_t n = inverse.n;
   equations::BodyScratch<T>& modes = s.modes;
-  HubSystem<T> I = s.I;
+  ArticulatedInertia<T> I = s.I;
   for (size_t k = 0; k < n; ++k) {
     Vec3<T> G{};
     T g = T(0.0);
@@ -293,7 +293,7 @@ void add_hung_children(const Link& link, const InverseOfMe<C>& inverse, const st
     }
   for (T& w : s.W) w = T(0.0);
   for (size_t i = 0; i < slots; ++i) {
-    const HubSystem<T>& I = s.hung[i];
+    const ArticulatedInertia<T>& I = s.hung[i];
     const T blocks[6][6] = {
         {I.tt.xx, I.tt.xy, I.tt.zx, I.tw.row[0].x, I.tw.row[0].y, I.tw.row[0].z},
         {I.tt.xy, I.tt.yy, I.tt.yz, I.tw.row[1].x, I.tw.row[1].y, I.tw.row[1].z},
@@ -352,7 +352,7 @@ void add_hung_children(const Link& link, const InverseOfMe<C>& inverse, const st
       s.Z[r * 7 + c] = sum;
       for (size_t a = 0; a < 6; ++a) I[a][c] += X(r, a) * sum;
     }
-  HubSystem<T>& to = s.I;
+  ArticulatedInertia<T>& to = s.I;
   to.tt += Sym3<T>{I[0][0], I[1][1], I[2][2], I[0][1], I[1][2], I[2][0]};
   to.ww += Sym3<T>{I[3][3], I[4][4], I[5][5], I[3][4], I[4][5], I[5][3]};
   for (size_t r = 0; r < 3; ++r) to.tw.row[r] += Vec3<T>{I[r][3], I[r][4], I[r][5]};

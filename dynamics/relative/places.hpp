@@ -84,8 +84,8 @@ inline Sym3<double> sum(const Sym3<Quad>& a, int count) {
   using flexboom::sum;
   return {sum(a.xx, count), sum(a.yy, count), sum(a.zz, count), sum(a.xy, count), sum(a.yz, count), sum(a.zx, count)};
 }
-inline equations::HubSystem<double> sum(const equations::HubSystem<Quad>& a, int count) {
-  equations::HubSystem<double> r;
+inline equations::ArticulatedInertia<double> sum(const equations::ArticulatedInertia<Quad>& a, int count) {
+  equations::ArticulatedInertia<double> r;
   r.tt = sum(a.tt, count), r.ww = sum(a.ww, count), r.ft = sum(a.ft, count), r.fw = sum(a.fw, count);
   for (size_t i = 0; i < 3; ++i) r.tw.row[i] = sum(a.tw.row[i], count);
   return r;

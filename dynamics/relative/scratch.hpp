@@ -13,7 +13,7 @@
 
 namespace flexboom::tree {
 
-using equations::HubSystem;
+using equations::ArticulatedInertia;
 
 /// A freedom after its elimination: its acceleration is (u - U . A) / D, A that of place b without it.
 template <class T>
@@ -56,16 +56,16 @@ struct LinkScratch {
 
   bool held_joint = false;  // by its law
 
-  HubSystem<T> I;  // of the body and all that hangs on it; in the end at place b, freedoms eliminated
+  ArticulatedInertia<T> I;  // of the body and all that hangs on it; in the end at place b, freedoms eliminated
   std::array<Eliminated<T>, 3> freedom;
   Twist<T> base, handle, acceleration;  // of place b without the joint's freedoms; of place b; of the body's origin
   std::vector<T> q_ddot;
 
   // Children on moving places, slot by slot.
-  std::vector<HubSystem<T>> hung;  // at their places, axes of the body
-  std::vector<Vec3<T>> place;      // where they are
-  std::vector<Twist<T>> U, P;      // motion per q_dot_k, and per modal force k
-  std::vector<T> K, W, Z, F;       // 6s x 6s, 6s x (6s + 1), 6s x 7, 6s x 7
+  std::vector<ArticulatedInertia<T>> hung;  // at their places, axes of the body
+  std::vector<Vec3<T>> place;               // where they are
+  std::vector<Twist<T>> U, P;               // motion per q_dot_k, and per modal force k
+  std::vector<T> K, W, Z, F;                // 6s x 6s, 6s x (6s + 1), 6s x 7, 6s x 7
 
   // A body that hangs on a moving place of its own.
   std::vector<Twist<T>> held, C, Y, V;

@@ -76,13 +76,20 @@ bool has_modal_mass(const tree::Link& link, const tree::LinkScratch<double>& s) 
   return true;
 }
 
+/// The first freedom of a link's joint that moves too little inertia, or -1.
+int weightless_freedom(const tree::Link& link, const tree::LinkScratch<double>& s) {
+  if (link.kind == JointKind::free || link.prescribed || s.held_joint) return -1;
+  for (int k = 0; k < joint_type(link.kind).freedoms; ++k)
+    if (!moves_inertia(link, s, k)) return k;
+  return -1;
+}
+
 /// What is wrong with the mass matrix at the body of a link; empty where nothing is.
 std::string mass_fault(const Multibody& scene, const tree::Link& link, const tree::LinkScratch<double>& s) {
   const JointType& type = joint_type(link.kind);
   const std::string& joint = scene.joints[static_cast<size_t>(link.joint)].name;
   const std::string& body = scene.bodies[static_cast<size_t>(link.index)].name;
-  for (int k = 0; k < type.freedoms && link.kind != JointKind::free && !link.prescribed && !s.held_joint; ++k) {
-    if (moves_inertia(link, s, k)) continue;
+  if (const int k = weightless_freedom(link, s); k >= 0) {
     const bool slides = type.freedom[static_cast<size_t>(k)] < Freedom::turn_x;
     return fmt::format(
         "joint {}: freedom {} of it moves an inertia of {:.3g} {}: too little to compute with; give body "
@@ -135,9 +142,7 @@ bool is_sound(const tree::Model& model, const tree::Scratch<double>& scratch) {
   for (const size_t i : scratch.singles) {
     const tree::Link& link = model.links[i];
     const tree::LinkScratch<double>& s = scratch.links[i];
-    sound = sound && has_modal_mass(link, s);
-    if (link.kind != JointKind::free && !link.prescribed && !s.held_joint)
-      for (int k = 0; k < joint_type(link.kind).freedoms; ++k) sound = sound && moves_inertia(link, s, k);
+    sound = sound && has_modal_mass(link, s) && weightless_freedom(link, s) < 0;
   }
   return sound;
 }

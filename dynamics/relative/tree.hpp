@@ -42,10 +42,9 @@ struct TreeLayout {
   int p = 0, base = 0, u = 0, size = 0;
   int spin = 0;        // of the first wheel
   int dissipated = 0;  // by the dampers of the joints, one each; by the structures and springs, one; then the work of
-                       // loads, wheels and prescribed joints
+                       // loads, wheels and prescribed joints, and the losses of laws
   int dissipated_elsewhere = 0, work = 0;
 
-  int u_begin() const { return p; }
   int rate(int place_in_p) const { return p + base + place_in_p; }
 };
 

@@ -17,7 +17,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int max_beam_order = 12;
 constexpr int default_elements = 8;   // of a boom whose segments leave the choice to make_mesh
 constexpr int max_elements = 100000;  // of a segment; more is a typing error
 
@@ -39,7 +38,8 @@ void validate_attachment(const RigidAttachment& attachment, double boom_length) 
 }
 
 void validate_order(int order) {
-  require(order >= 1 && order <= max_beam_order, fmt::format("order is {}; it must be 1 to {}", order, max_beam_order));
+  require(order >= 1 && order <= highest_beam_order,
+          fmt::format("order is {}; it must be 1 to {}", order, highest_beam_order));
 }
 
 // Where nodes are needed, as fractions of a segment: 0, attachments inside, 1.

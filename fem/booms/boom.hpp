@@ -22,6 +22,9 @@ struct RigidAttachment {
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();   // boom axis to its mass centre, boom axes [m]
 };
 
+/// Polynomial orders of beams go from 1 to this.
+inline constexpr int highest_beam_order = 12;
+
 /// A boom along +x of its body frame (BRF), root at the origin; y and z are the principal axes of every section.
 struct BeamGeometry {
   std::vector<BeamSegment> segments;

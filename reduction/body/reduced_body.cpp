@@ -56,9 +56,7 @@ void validate_rigid_part(const ReducedBody& body, const Checker& c) {
   c.symmetric(body.J0, "J0");
   // Principal moments about the mass centre: not negative, and none greater than the sum of the others (a line mass has
   // equality).
-  const Eigen::Vector3d r = body.mc0 / body.m;
-  const Eigen::Matrix3d about_centre =
-      body.J0 - body.m * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
+  const Eigen::Matrix3d about_centre = body.J0 - centre_inertia(body.m, body.mc0);
   const Eigen::Vector3d principal =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(about_centre, Eigen::EigenvaluesOnly).eigenvalues();
   const double slack = relative_round_off * body.J0.norm();
@@ -206,6 +204,10 @@ void set_invariants(ReducedBody& body, Eigen::MatrixXd gram) {
     }
   }
   body.gram = std::move(gram);
+}
+
+Eigen::Matrix3d centre_inertia(double m, const Eigen::Vector3d& mc0) {
+  return (mc0.squaredNorm() * Eigen::Matrix3d::Identity() - mc0 * mc0.transpose()) / m;
 }
 
 ReducedBody rigid_body(std::string name, double m, const Eigen::Vector3d& mc0, const Eigen::Matrix3d& J0) {

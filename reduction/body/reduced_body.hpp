@@ -122,6 +122,9 @@ ReducedBody blank_body(std::string name, int n);
 /// Sets m, mc0, J0, Ct, Cr0, Cr1, Me, J1 and J2 from `gram` of that body, and keeps it.
 void set_invariants(ReducedBody&, Eigen::MatrixXd gram);
 
+/// -sum dm tilde(c) tilde(c) of the mass m in its centre c: J0 about the origin = inertia about the centre + this.
+Eigen::Matrix3d centre_inertia(double m, const Eigen::Vector3d& mc0);
+
 /// A rigid body of mass m [kg], first moment and inertia about its BRF origin.
 ReducedBody rigid_body(std::string name, double m, const Eigen::Vector3d& mc0, const Eigen::Matrix3d& J0);
 

@@ -87,10 +87,6 @@ ReducedBody with_unit_modal_mass(const ReducedBody& body) {
   return result;
 }
 
-Eigen::Matrix3d centre_inertia(double m, const Eigen::Vector3d& mc0) {
-  return (mc0.squaredNorm() * Eigen::Matrix3d::Identity() - mc0 * mc0.transpose()) / m;
-}
-
 std::string plain_name(std::string_view name) {
   std::string plain(name);
   for (char& c : plain) {

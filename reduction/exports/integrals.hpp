@@ -51,9 +51,6 @@ ModalCoordinates modal_coordinates(const ReducedBody&);
 /// @throws InputError when the body has no gram.
 ReducedBody with_unit_modal_mass(const ReducedBody&);
 
-/// -sum dm tilde(c) tilde(c) of the mass m in its centre c: J0 about the origin = inertia about the centre + this.
-Eigen::Matrix3d centre_inertia(double m, const Eigen::Vector3d& mc0);
-
 /// A name without white space, quotes and commas, "_" instead; not empty.
 std::string plain_name(std::string_view name);
 

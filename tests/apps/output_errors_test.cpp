@@ -133,7 +133,7 @@ TEST(OutputErrors, EveryUnitIsThatOfAnOutput) {
 
 TEST(ErrorBudget, TotalIsThatOfTheWorstOutput) {
   ErrorBudget budget;
-  budget.outputs = {{"a.tip", 1, 1e-3, 1e-4, 1e-5, 1e-6, 2.0}, {"b.rate", 1, 0, 5e-3, 1e-5, 1e-6, 3.0}};
+  budget.outputs = {{{1e-3, 1e-4, 1e-5, 1e-6}, "a.tip", 1, 2.0}, {{0, 5e-3, 1e-5, 1e-6}, "b.rate", 1, 3.0}};
   ASSERT_NE(budget.worst(), nullptr);
   EXPECT_EQ(budget.worst()->name, "b.rate");
   EXPECT_DOUBLE_EQ(budget.total(), 5.011e-3);
@@ -144,9 +144,9 @@ TEST(ErrorBudget, TotalIsThatOfTheWorstOutput) {
 
 TEST(ErrorBudget, WhatIsUnknownIsNeverMetAndHidesNoKnownError) {
   ErrorBudget budget;
-  budget.outputs = {{"a.tip", 1, 1e-3, 1e-4, 1e-5, 1e-6, 2.0},
-                    {"b.rate", 1, 0, unknown, 1e-5, 1e-6, 3.0},
-                    {"c.rate", 1, 0, unknown, 1, 1, 0}};
+  budget.outputs = {{{1e-3, 1e-4, 1e-5, 1e-6}, "a.tip", 1, 2.0},
+                    {{0, unknown, 1e-5, 1e-6}, "b.rate", 1, 3.0},
+                    {{0, unknown, 1, 1}, "c.rate", 1, 0}};
   EXPECT_EQ(budget.worst()->name, "c.rate");
   EXPECT_TRUE(std::isnan(budget.total()));
   EXPECT_FALSE(budget.within(1e3));
@@ -154,7 +154,7 @@ TEST(ErrorBudget, WhatIsUnknownIsNeverMetAndHidesNoKnownError) {
 
 TEST(ErrorBudget, CoordinatesHaveNoErrorsOfAnotherBasis) {
   ErrorBudget budget;
-  budget.outputs = {{"a.q", 1, unknown, unknown, 1e-5, 1e-6, 2.0}};
+  budget.outputs = {{{unknown, unknown, 1e-5, 1e-6}, "a.q", 1, 2.0}};
   EXPECT_DOUBLE_EQ(budget.total(), 1.1e-5);
 }
 

@@ -29,7 +29,6 @@ struct HubLayout {
   int p = 0, u = 0, base = 0, size = 0, spent = 0;
   TreeLayout::Joint floats;
 
-  int u_begin() const { return p; }
   int position() const { return floats.position; }
   int attitude() const { return floats.attitude; }
   int velocity() const { return floats.velocity; }

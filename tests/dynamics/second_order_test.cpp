@@ -48,11 +48,11 @@ ReducedBody stiffened_beam(const SectionShape& section, double length, double ti
 MatrixXd mass_matrix(const Tree& tree, const VectorXd& y0) {
   const TreeLayout& l = tree.layout();
   VectorXd y = y0;
-  y.segment(l.u_begin(), l.u).setZero();
+  y.segment(l.p, l.u).setZero();
   const auto energy = [&](Index i, Index j) {
     VectorXd moving = y;
-    moving[l.u_begin() + i] += 1;
-    if (j >= 0) moving[l.u_begin() + j] += 1;
+    moving[l.p + i] += 1;
+    if (j >= 0) moving[l.p + j] += 1;
     return tree.balance(0, moving).kinetic;
   };
   MatrixXd M(l.u, l.u);

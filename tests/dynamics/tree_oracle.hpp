@@ -111,7 +111,7 @@ class Oracle {
   Eigen::VectorXd rates(const Eigen::VectorXd& y) const {
     const TreeLayout& l = tree_.layout();
     Eigen::VectorXd r(size_);
-    r.head(l.u) = y.segment(l.u_begin(), l.u);
+    r.head(l.u) = y.segment(l.p, l.u);
     for (size_t i = 0; i < floating_.size(); ++i)
       if (floating_[i] >= 0) r.segment<3>(floating_[i]) = y.segment<3>(l.joints[i].velocity);
     return r;

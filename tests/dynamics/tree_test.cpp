@@ -112,7 +112,7 @@ struct TreeCase {
 VectorXd accelerations(const Tree& tree, const VectorXd& y_dot, int size) {
   const TreeLayout& l = tree.layout();
   VectorXd r(size);
-  r.head(l.u) = y_dot.segment(l.u_begin(), l.u);
+  r.head(l.u) = y_dot.segment(l.p, l.u);
   int next = l.u;
   for (const TreeLayout::Joint& j : l.joints)
     if (j.velocity >= 0) r.segment<3>(next) = y_dot.segment<3>(j.velocity), next += 3;
