@@ -115,7 +115,7 @@ class TreeCheck {
     std::vector<size_t> peaks;
     for (size_t i = 1; i < looks; ++i)
       if (size[i] > 0 && size[i] >= size[i - 1] && size[i] >= size[i + 1]) peaks.push_back(i);
-    constexpr size_t most_peaks = 32;  // the highest
+    constexpr size_t most_peaks = 8;  // the highest: a pole is one of them
     std::ranges::sort(peaks, std::greater(), [&](size_t i) { return size[i]; });
     peaks.resize(std::min(peaks.size(), most_peaks));
     for (const size_t i : peaks) {
