@@ -162,7 +162,7 @@ TEST(Mesh, BadInputSaysWhatIsWrong) {
 // Late ones are met at once by another thread than the first.
 TEST(Mesh, TheFirstBadElementIsNamedByAnyNumberOfThreads) {
   Mesh mesh = make_mesh(uniform_boom(RoundBar{0.01}, 0.3, BeamTheory::timoshenko, 500, 1));
-  for (const size_t e : {130, 131, 200, 400}) mesh.elements[e].order = 0;
+  for (const size_t e : {130U, 131U, 200U, 400U}) mesh.elements[e].order = 0;
   for (const int threads : {1, 2, 4}) {
     EXPECT_EQ(input_error([&] { mesh.validate(threads); }),
               "mesh: beam-timoshenko element 130: order is 0; it must be 1 to 12");
