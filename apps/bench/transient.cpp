@@ -1,7 +1,7 @@
 #include "apps/bench/transient.hpp"
 
-#include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/simulate.hpp"
+#include "apps/simulate/variants.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 

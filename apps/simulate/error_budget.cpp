@@ -6,6 +6,8 @@
 #include "apps/simulate/field_error.hpp"
 #include "apps/simulate/flights_ahead.hpp"
 #include "apps/simulate/late_vibrations.hpp"
+#include "apps/simulate/time_error.hpp"
+#include "apps/simulate/variants.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
@@ -23,8 +25,6 @@
 
 namespace flexboom {
 
-long bearable_steps(const Run& run) { return 20 * run.motion.summary.steps + 20000; }
-
 OutputTable without_coordinates(const OutputTable& table) {
   OutputTable r;
   std::vector<Eigen::Index> kept;
@@ -35,27 +35,6 @@ OutputTable without_coordinates(const OutputTable& table) {
   }
   r.values = table.values(Eigen::all, kept);
   return r;
-}
-
-Scene with_stiffening(Scene scene) {
-  for (BodyScene& b : scene.bodies)
-    if (!b.rigid && b.structure != "rigid") b.stiffening = "on";
-  return scene;
-}
-
-Scene with_a_digit_more(Scene scene) {
-  scene.integrator_tolerance = std::stod(fmt::format("{:.6g}", scene.step_tolerance() / 10));
-  return scene;
-}
-
-Scene as_flown(Scene scene, const Run& run) {
-  for (BodyScene& b : scene.bodies) {
-    const auto body = std::ranges::find(run.bodies, b.name, [](const PreparedBody& p) { return p.body.name; });
-    if (b.stiffening != "auto" || body == run.bodies.end()) continue;
-    const auto index = static_cast<int>(body - run.bodies.begin());
-    b.stiffening = run.tree->stiffening(index) == Stiffening::off ? "off" : "on";
-  }
-  return scene;
 }
 
 namespace {
@@ -278,6 +257,9 @@ void add(std::vector<OutputDifference>& sum, const std::vector<OutputDifference>
   }
 }
 
+/// Of the error of time: other parts come beside it.
+Settling settling_of(const Scene& scene) { return {scene.tolerance / 3, 2, bearable_balance(scene.tolerance)}; }
+
 bool is_asked_for(const Scene& scene, const std::string& output) {
   return std::ranges::any_of(scene.outputs,
                              [&](const std::string& text) { return wanted_output(text).name == output; });
@@ -331,79 +313,9 @@ double linearisation_error(Scene& scene, Scene& flown, Run& run, Measuring& m) {
 
 namespace {
 
-/// About the mass centre.
-double least_inertia(const ReducedBody& body) {
-  const Eigen::Matrix3d about_centre = body.J0 - centre_inertia(body.m, body.mc0);
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(about_centre, Eigen::EigenvaluesOnly).eigenvalues()[0];
-}
-
-}  // namespace
-
-OutputFloors floors_of(const Scene& scene, const std::vector<PreparedBody>& bodies) {
-  OutputFloors floors{scene.tolerance};
-  for (const PreparedBody& p : bodies)  // the largest radius of gyration: what lengths of the scene are like
-    floors.length = std::max(floors.length, std::sqrt(p.body.J0.trace() / p.body.m));
-  for (const PreparedBody& p : bodies) {
-    const double least = p.body.n() == 0 ? least_inertia(p.body) : 0;
-    const bool is_round_off = !(least > 1e-9 * p.body.J0.trace());
-    if (!is_round_off && !(floors.inertia > 0 && floors.inertia <= least)) floors.inertia = least;
-  }
-  for (const std::string& text : scene.absolute) floors.absolute.push_back(absolute_error(text));
-  return floors;
-}
-
-std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors& floors, Settling asked,
-                                                const RunHooks& hooks, std::vector<std::string>& plan) {
-  for (double before = std::numeric_limits<double>::infinity();;) {
-    const Scene tight = with_a_digit_more(flown);
-    Run finer = fly(tight, hooks, 0, bearable_steps(run));
-    std::vector<OutputDifference> differences = compare_outputs(run.outputs, finer.outputs, flown.outputs, floors);
-    const double error = largest(differences);
-    if (!(error < std::exchange(before, error) / 5)) --asked.digits;
-    const double balance = run.motion.summary.energy_balance;
-    const bool is_settled = error <= asked.bearable && !(balance > asked.balance);
-    if (is_settled || asked.digits <= 0 || hooks.stopped() || tight.step_tolerance() < least_tolerance)
-      return differences;
-    const std::string energies = error <= asked.bearable ? fmt::format("energy balance {:.1e}, ", balance) : "";
-    plan.push_back(fmt::format(
-        "time integration: {}changed by {:.1e} at a tenth of the tolerance {:.0e}; the integrator gets {:.0e}",
-        energies, error, flown.step_tolerance(), tight.step_tolerance()));
-    run = std::move(finer);
-    flown = tight;
-  }
-}
-
-std::vector<std::string> wanted_pointings(const Scene& scene) {
-  std::vector<std::string> outputs = scene.outputs;
-  if (outputs.empty() && !scene.turns.empty()) return {scene.turns.front().body + ".pointing"};
-  std::erase_if(outputs, [](const std::string& text) { return !is_pointing(wanted_output(text).name); });
-  return outputs;
-}
-
-std::string settle_pointing(Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan) {
-  Scene flown = as_flown(scene, run);
-  flown.outputs = wanted_pointings(scene);
-  if (flown.outputs.empty()) return "";
-  constexpr double promised = 10;
-  constexpr std::string_view of_high_order[] = {"exponential", "adams", "erk"};
-  const bool is_cheap = std::ranges::find(of_high_order, run.motion.summary.method) != std::end(of_high_order);
-  const Settling asked{promised * scene.tolerance / 3, is_cheap ? 2 : 0};
-  std::string warning;
-  try {
-    for (const OutputDifference& d : settle_time_error(flown, run, floors_of(scene, run.bodies), asked, hooks, plan))
-      if (d.error > asked.bearable)
-        warning = fmt::format("{} is off by {:.1e} or more, by a repeat with a digit more: a smaller tolerance helps",
-                              d.name, d.error);
-  } catch (const std::runtime_error& e) {  // the run that is repeated outlives a failure
-    warning =
-        fmt::format("{} may be off by more than ten times the tolerance: {}", fmt::join(flown.outputs, ", "), e.what());
-  }
-  scene.integrator_tolerance = flown.integrator_tolerance;
-  return warning;
-}
-
-ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan,
-                           const StillKinds& still) {
+/// Of a run, from repeats of it.
+ErrorBudget budget_by_repeats(Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan,
+                              const StillKinds& still) {
   Measuring m{{hooks, floors_of(scene, run.bodies)}, plan};
   ErrorBudget& budget = m.budget;
   Scene flown = as_flown(scene, run);
@@ -439,7 +351,7 @@ ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::v
   budget.linearisation = measured("linearisation", [&] { return linearisation_error(scene, flown, run, m); });
   look_beyond();
   budget.time = measured("time", [&] {
-    const Settling asked{scene.tolerance / 3, 2, bearable_balance(scene.tolerance)};  // others come
+    const Settling asked = settling_of(scene);
     constexpr double of_tighter = 1.15;  // a flight with a digit more has a tenth of the error left
     return m.enter(&OutputErrors::time,
                    {settle_time_error(flown, run, m.repeats.floors, asked, hooks, m.plan), of_tighter});
@@ -456,6 +368,56 @@ ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::v
   budget.measured = !hooks.stopped();
   for (const std::string& line : budget.missing) plan.push_back("error budget: " + line);
   return budget;
+}
+
+/// From repeats of another run of its model, by the cheapest means. Its errors of time are differences from that run,
+/// and those that it has itself. Nothing: there is no other run.
+std::optional<ErrorBudget> budget_by_another(Scene& scene, Run& run, const RunHooks& hooks,
+                                             std::vector<std::string>& plan, const StillKinds& still) {
+  std::optional<Scene> cheap = by_cheapest_means(scene);
+  if (!cheap) return {};
+  Run other;
+  try {
+    other = fly(as_flown(*cheap, run), hooks, 0, bearable_steps(run));
+  } catch (const std::runtime_error&) {  // the run that is measured outlives a failure
+    return {};
+  }
+  if (other.motion.summary.interrupted) return {};
+  plan.push_back(fmt::format("error budget: repeats are those of a run in relative coordinates by {}, which cost less",
+                             other.motion.summary.method));
+  std::vector<std::string> words;
+  Measuring m{{hooks, floors_of(scene, run.bodies)}, plan, budget_by_repeats(*cheap, other, hooks, words, still)};
+  std::erase_if(words, [](const std::string& line) { return line.starts_with(of_time); });  // the other run's tolerance
+  plan.insert(plan.end(), words.begin(), words.end());
+  if (!m.budget.measured) return m.budget;
+  try {
+    if (m.budget.has_stiffened) {
+      for (size_t i = 0; i < scene.bodies.size(); ++i) scene.bodies[i].stiffening = cheap->bodies[i].stiffening;
+      Run stiffened = run_once(scene, hooks);
+      if (stiffened.motion.summary.interrupted) throw NumericalError("interrupted");
+      run = std::move(stiffened);
+    }
+    Scene flown = as_flown(scene, run);
+    Settling asked = settling_of(scene);
+    asked.bearable = std::max(asked.bearable, 2 * m.budget.time);  // of the other: no step here mends that
+    const Finding found{settle_time_error(flown, run, m.repeats.floors, asked, hooks, plan, &other)};
+    scene.integrator_tolerance = flown.integrator_tolerance;
+    m.budget.time = m.enter(&OutputErrors::time, found,
+                            [](const OutputErrors& of_other) { return of_other.time * of_other.scale; });
+  } catch (const std::runtime_error& e) {
+    m.missing("time", e.what());
+    m.budget.time = unknown;
+    for (OutputErrors& o : m.budget.outputs) o.time = unknown;
+  }
+  return m.budget;
+}
+
+}  // namespace
+
+ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan,
+                           const StillKinds& still) {
+  if (std::optional<ErrorBudget> budget = budget_by_another(scene, run, hooks, plan, still)) return *budget;
+  return budget_by_repeats(scene, run, hooks, plan, still);
 }
 
 }  // namespace flexboom

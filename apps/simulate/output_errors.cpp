@@ -197,4 +197,27 @@ double ErrorBudget::total() const {
   return all_known ? worst()->total() : unknown;
 }
 
+namespace {
+
+/// About the mass centre.
+double least_inertia(const ReducedBody& body) {
+  const Eigen::Matrix3d about_centre = body.J0 - centre_inertia(body.m, body.mc0);
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(about_centre, Eigen::EigenvaluesOnly).eigenvalues()[0];
+}
+
+}  // namespace
+
+OutputFloors floors_of(const Scene& scene, const std::vector<PreparedBody>& bodies) {
+  OutputFloors floors{scene.tolerance};
+  for (const PreparedBody& p : bodies)  // the largest radius of gyration: what lengths of the scene are like
+    floors.length = std::max(floors.length, std::sqrt(p.body.J0.trace() / p.body.m));
+  for (const PreparedBody& p : bodies) {
+    const double least = p.body.n() == 0 ? least_inertia(p.body) : 0;
+    const bool is_round_off = !(least > 1e-9 * p.body.J0.trace());
+    if (!is_round_off && !(floors.inertia > 0 && floors.inertia <= least)) floors.inertia = least;
+  }
+  for (const std::string& text : scene.absolute) floors.absolute.push_back(absolute_error(text));
+  return floors;
+}
+
 }  // namespace flexboom

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "apps/model/prepared_body.hpp"
+#include "apps/scene/scene.hpp"
 #include "apps/scene/wanted_accuracy.hpp"
 #include "dynamics/events/flight.hpp"
 #include "reduction/body/reduced_body.hpp"
@@ -61,6 +63,9 @@ std::vector<OutputDifference> compare_outputs(const OutputTable& a, const Output
 
 /// The largest of the errors, 0 of none.
 double largest(const std::vector<OutputDifference>&);
+
+/// What the outputs of a scene with these bodies must bear.
+OutputFloors floors_of(const Scene&, const std::vector<PreparedBody>&);
 
 /// What a run that shares little with this one says of its outputs.
 struct ReferenceCheck {

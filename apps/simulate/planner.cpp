@@ -6,6 +6,8 @@
 #include "apps/model/static_shapes.hpp"
 #include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/flights_ahead.hpp"
+#include "apps/simulate/time_error.hpp"
+#include "apps/simulate/variants.hpp"
 #include "fem/base/check.hpp"
 #include "fem/booms/solid_boom.hpp"
 
@@ -53,11 +55,6 @@ std::string counted(const std::vector<std::string>& kinds) {
   parts.reserve(count.size());
   for (const auto& [kind, n] : count) parts.push_back(fmt::format("{} {}", n, kind));
   return parts.empty() ? "none" : fmt::format("{}", fmt::join(parts, ", "));
-}
-
-/// By multipliers a flight with many modes takes minutes. What modes do is the same by relative coordinates.
-bool is_costly_by_its_formulation(const Scene& scene) {
-  return scene.formulation == "multipliers" && std::ranges::none_of(scene.joints, &JointScene::closes_loop);
 }
 
 }  // namespace
@@ -163,10 +160,6 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
     open = with_candidates(scene, candidates, candidates, hooks);
     all = with_a_digit_more(as_flown(open, few));  // errors of its time are no part of differences
     all.integrator_tolerance = std::max(all.integrator_tolerance, least_tolerance);
-    if (is_costly_by_its_formulation(all)) {
-      all.formulation = "relative", all.integrator = "auto";
-      all.integrator_tolerance = std::max(all.tolerance / 10, least_tolerance);
-    }
   };
   const auto bearable = [&few] { return 2 * bearable_steps(few); };  // of a tighter tolerance
   if (!std::exchange(is_timed_, true)) {
@@ -178,7 +171,7 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
     try {
       settle_time_error(with_few, few, floors_of(scene, few.bodies), asked, hooks, plan);
     } catch (const NumericalError& e) {  // no more digits can be had: those that were reached count
-      plan.push_back(fmt::format("time integration: no tighter than {:.0e}: {}", with_few.step_tolerance(), e.what()));
+      plan.push_back(fmt::format("{}no tighter than {:.0e}: {}", of_time, with_few.step_tolerance(), e.what()));
     }
     if (with_few.integrator_tolerance != scene.integrator_tolerance) give_up_ahead(hooks);
     scene.integrator_tolerance = with_few.integrator_tolerance;
@@ -204,6 +197,16 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
 
 bool Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
   if (open_.empty()) return false;
+  std::optional<Scene> cheap = by_cheapest_means(scene);
+  if (!cheap) return choose_as_flown(scene, hooks, plan);
+  const bool has_chosen = choose_as_flown(*cheap, hooks, plan);
+  cheap->formulation = scene.formulation, cheap->integrator = scene.integrator;
+  cheap->integrator_tolerance = scene.integrator_tolerance;
+  scene = *std::move(cheap);
+  return has_chosen;
+}
+
+bool Planner::choose_as_flown(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
   Scene given = scene;
   bool has_chosen = false, was_far = false;
   std::vector<std::string> words;

@@ -44,6 +44,7 @@ class Planner {
     double needed = 0;          // part of those that move
     double error_of_fewer = 0;  // of the most that are not enough
   };
+  bool choose_as_flown(Scene&, const RunHooks&, std::vector<std::string>& plan);
   std::optional<Choice> choose_among_candidates(Scene&, const RunHooks&, std::vector<std::string>& plan);
   /// Clamped bodies take theirs from so many that are `made`, and some for the budget: once for all runs.
   Scene with_candidates(const Scene&, int candidates, int made, const RunHooks&) const;

@@ -7,7 +7,9 @@
 #include "apps/simulate/multipliers_flight.hpp"
 #include "apps/simulate/planner.hpp"
 #include "apps/simulate/steady_motion.hpp"
+#include "apps/simulate/time_error.hpp"
 #include "apps/simulate/tree_flight.hpp"
+#include "apps/simulate/variants.hpp"
 #include "apps/simulate/verify.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
@@ -273,9 +275,9 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
   Run run = run_once(r.scene, of_run);
   std::vector<std::string> words;  // of the budget
   std::string warning;
-  // The repeats cost many times the run; a long one is not repeated.
+  // The repeats cost many times the run; a long one is not repeated, unless there are cheaper means.
   constexpr long worth_repeating = 2'000'000;
-  const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating;
+  const bool repeat = run.motion.summary.rhs_evaluations <= worth_repeating || by_cheapest_means(r.scene);
   if (r.scene.error_budget && !repeat)
     warning = fmt::format("the error budget was not measured: its repeats would cost many times {} evaluations",
                           run.motion.summary.rhs_evaluations);

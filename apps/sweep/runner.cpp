@@ -1,8 +1,8 @@
 #include "apps/sweep/runner.hpp"
 
-#include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/planner.hpp"
 #include "apps/simulate/steady_motion.hpp"
+#include "apps/simulate/time_error.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 

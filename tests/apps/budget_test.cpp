@@ -2,6 +2,7 @@
 
 #include "apps/results/results.hpp"
 #include "apps/simulate/error_budget.hpp"
+#include "apps/simulate/variants.hpp"
 #include "tests/apps/reduced_testing.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
@@ -347,12 +348,41 @@ TEST(BudgetOfATree, GeometricStiffnessThatCountsIsInTheRunThatIsKept) {
   EXPECT_LT(off.budget.time, 1e-5);
 }
 
+/// Multipliers and methods that stiff modes hold up: repeats with more modes are those of a cheaper run of the model.
+TEST(BudgetOfATree, OfCostlyMeansIsThatOfTheCheapest) {
+  Scene scene = parse_scene(swing_on_joints, "joints.toml");
+  scene.tolerance = 1e-5;
+  const RunResult cheap = run_scene(scene, {});
+  Scene truth = scene;
+  truth.tolerance = 1e-10;
+  truth.error_budget = false;
+  const RunResult reference = run_scene(truth, {});
+  for (const auto& [formulation, method] :
+       {std::pair{"multipliers", "auto"}, {"relative", "bdf"}, {"relative", "erk"}}) {
+    SCOPED_TRACE(fmt::format("{} {}", formulation, method));
+    scene.formulation = formulation, scene.integrator = method;
+    const RunResult r = run_scene(scene, {});
+    EXPECT_EQ(r.scene.formulation, formulation);
+    EXPECT_EQ(r.scene.integrator, method);
+    EXPECT_TRUE(r.budget.missing.empty());
+    EXPECT_TRUE(std::ranges::any_of(r.plan, [](const std::string& line) {
+      return line.starts_with("error budget: repeats are those of a run in relative coordinates by exponential");
+    }));
+    for (const auto part : {&ErrorParts::truncation, &ErrorParts::linearisation})
+      EXPECT_NEAR(r.budget.*part, cheap.budget.*part, 0.02 * cheap.budget.*part + 1e-9);
+    const double error = largest(compare_outputs(r.outputs, reference.outputs, scene.outputs));
+    EXPECT_GT(error, 1e-8);  // of the method itself
+    EXPECT_GT(r.budget.time, 0.9 * error);
+    EXPECT_LT(r.budget.time, 3 * error);
+  }
+}
+
 /// A repeat that fails costs its part of the budget, not the run: the tighter one where the tolerance nears round-off.
 TEST(BudgetOfAnyScene, OutlivesARepeatThatFails) {
   for (Scene scene : {load_scene("sport"), parse_scene(swing_on_joints, "joints.toml")}) {
     SCOPED_TRACE(scene.name);
     scene.duration = 0.05;
-    scene.integrator = "adams";
+    scene.integrator = "dirk";
     bool failed = false;
     for (double tolerance = 1e-11; tolerance > 5e-15 && !failed; tolerance /= 10) try {
         scene.tolerance = tolerance;

@@ -184,8 +184,9 @@ TEST(Planner, WhatNothingMovesIsNoPartOfTheTruncation) {
 // A torque along a bar twists it. Geometric stiffness makes it shorter then, which moves the hub by its axial mode: a
 // kind that nothing moves without. A scene that leaves the stiffness open has it, and the modes, or says what is
 // missing.
-TEST(Planner, GeometricStiffnessCouplesKindsOfModes) {
-  Scene scene = spun_about("z", 1e-3);
+/// A bar on a boom that a torque twists: without geometric stiffness nothing moves the hub along.
+Scene twisted(const std::string& modes) {
+  Scene scene = spun_about("z", 1e-3, modes);
   scene.duration = 0.5, scene.output_step = 0.005, scene.outputs = {"fly.velocity"};
   BodyScene& boom = scene.bodies[1];
   boom.directions = "all", boom.directions_given = true;
@@ -194,6 +195,11 @@ TEST(Planner, GeometricStiffnessCouplesKindsOfModes) {
   scene.loads[0].at = {.body = "boom", .marker = "bar"};
   scene.loads[0].torque = {};
   scene.loads[0].torque[0].expression = "1e-3*(t<0.2)";
+  return scene;
+}
+
+TEST(Planner, GeometricStiffnessCouplesKindsOfModes) {
+  const Scene scene = twisted("\"auto\"");
   const RunResult r = run_scene(scene, {});
   EXPECT_EQ(r.scene.bodies[1].stiffening, "on") << "a plan that is kept has it";
   EXPECT_TRUE(kinds_of(r).contains("axial"));
@@ -203,6 +209,18 @@ TEST(Planner, GeometricStiffnessCouplesKindsOfModes) {
   const double error = largest(compare_outputs(r.outputs, run_scene(full, {}).outputs, scene.outputs, {}));
   EXPECT_GT(r.budget.total(), error);
   EXPECT_LT(r.budget.total(), 3 * error);
+}
+
+/// Repeats in relative coordinates find that stiffness counts: the run by multipliers that is kept has it.
+TEST(Planner, GeometricStiffnessIsSwitchedOnByMultipliersToo) {
+  Scene scene = twisted("18");
+  scene.duration = 0.1, scene.formulation = "multipliers";
+  const RunResult r = run_scene(scene, {});
+  EXPECT_EQ(r.trajectory.summary.method, "ida");
+  EXPECT_TRUE(r.budget.has_stiffened);
+  EXPECT_EQ(r.scene.bodies[1].stiffening, "on");
+  EXPECT_EQ(r.tree->stiffening(1), Stiffening::on);
+  EXPECT_LT(r.budget.time, 1e-3) << "no part of what stiffness changes";
 }
 
 TEST(Planner, ThePlanIsPartOfTheSceneThatWasRun) {
