@@ -259,13 +259,18 @@ void SparseFactor::factorise(const SparseMatrix& A) {
   impl_->factorised = false;
   const Stopwatch start;
   const WithoutOpenMP alone;
+  // It stops all threads for a moment: longer than a small factor takes.
+  constexpr long large = 8L << 20;  // [numbers]
+  const auto return_memory = [is_large = impl_->summary.nonzeros > large] {
+    if (is_large) return_freed_memory();
+  };
   {
     PermutedMatrix permuted(A, impl_->place, true);
     cholmod_sparse a = permuted.view();
-    return_freed_memory();
+    return_memory();
     cholmod_factorize(&a, impl_->L, &impl_->common);
   }
-  return_freed_memory();
+  return_memory();
   if (impl_->common.status == CHOLMOD_NOT_POSDEF) impl_->require_definite();
   check_status(impl_->common, "sparse factorisation");
   impl_->check_pivots();
