@@ -273,11 +273,9 @@ void TableReader::reject_unknown(const std::string& hint) {
   if (is_of_other_kind_ && !known.empty()) faults_->append(path_, fmt::format(" with {}", fmt::join(known, ", ")));
   for (const auto& [name, value] : table_->entries) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-    const std::string near = nearest(name, known);
-    faults_->add(
-        path(is_bare_key(name) ? name : in_quotes(name)), value.place,
-        fmt::format("unknown key; {}{} takes {}{}", near.empty() ? "" : "did you mean " + in_quotes(near) + "? ",
-                    path_.empty() ? "the top level" : path_, fmt::join(known, ", "), hint));
+    faults_->add(path(is_bare_key(name) ? name : in_quotes(name)), value.place,
+                 fmt::format("unknown key; {}{} takes {}{}", question(name, known),
+                             path_.empty() ? "the top level" : path_, fmt::join(known, ", "), hint));
   }
 }
 

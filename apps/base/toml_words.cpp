@@ -60,10 +60,13 @@ std::string nearest(std::string_view value, std::span<const std::string_view> na
   return result;
 }
 
-std::string not_among(const std::string& value, std::span<const std::string_view> names) {
+std::string question(std::string_view value, std::span<const std::string_view> names) {
   const std::string near = nearest(value, names);
-  return fmt::format("is {}; {}it must be {}", in_quotes(shortened(value)),
-                     near.empty() ? "" : "did you mean " + in_quotes(near) + "? ", listed(names));
+  return near.empty() ? "" : "did you mean " + in_quotes(near) + "? ";
+}
+
+std::string not_among(const std::string& value, std::span<const std::string_view> names) {
+  return fmt::format("is {}; {}it must be {}", in_quotes(shortened(value)), question(value, names), listed(names));
 }
 
 std::string in_quotes(std::string_view text) {

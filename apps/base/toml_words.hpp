@@ -13,6 +13,9 @@ std::string not_among(const std::string& value, std::span<const std::string_view
 /// The name that differs by the fewest edits, empty if none is near.
 std::string nearest(std::string_view value, std::span<const std::string_view> names);
 
+/// `did you mean "X"? ` of the nearest, empty if none is near.
+std::string question(std::string_view value, std::span<const std::string_view> names);
+
 /// A TOML basic string with its quotes; control characters are escaped, so it is also fit for messages.
 std::string in_quotes(std::string_view text);
 

@@ -103,12 +103,25 @@ void take_plan(Scene& scene, const std::filesystem::path& from) {
   for (BodyScene& b : scene.bodies) {
     if (!b.is_boom()) continue;
     const auto p = std::ranges::find(planned.bodies, b.name, &BodyScene::name);
-    require(p != planned.bodies.end() && p->is_boom(),
-            fmt::format("--plan: {} has no boom \"{}\"", from.string(), b.name));
+    if (p == planned.bodies.end() || !p->is_boom()) {
+      std::vector<std::string_view> names;
+      for (const BodyScene& other : planned.bodies)
+        if (other.is_boom()) names.push_back(other.name);
+      throw InputError(fmt::format("--plan: {} has no boom \"{}\"; {}it has \"{}\"", from.string(), b.name,
+                                   toml_reader::question(b.name, names), fmt::join(names, "\", \"")));
+    }
     b.structure = p->structure, b.stiffening = p->stiffening, b.solid = p->solid, b.geometry.order = p->geometry.order;
     b.modes = p->modes, b.shapes = p->shapes, b.directions = p->directions;
     b.basis.corrections = p->basis.corrections;
     b.modes_auto = p->modes_auto, b.directions_given = p->directions_given;
+    BodyScene same = *p;
+    same.damping = b.damping;
+    if (to_toml(same) != to_toml(b))
+      scene.warnings.push_back(fmt::format(
+          "--plan: body {} is another one in {}: its modes are chosen by their places in the order of frequencies, "
+          "which may be other modes here; an error budget shows what that costs, and without --plan they are chosen "
+          "anew",
+          b.name, from.string()));
   }
 }
 
@@ -196,12 +209,12 @@ void print_checks(const RunResult& r) {
 }
 
 void print_summary(const RunResult& r, const std::filesystem::path& folder) {
-  const IntegrationSummary& s = r.trajectory.summary;
-  const double simulated = r.trajectory.time.back() - r.trajectory.time.front();
+  const IntegrationSummary& s = r.motion.summary;
+  const double simulated = r.motion.time.back() - r.motion.time.front();
   for (const std::string& line : r.plan) fmt::print("{}\n", line);
   fmt::print("\n{:g} s in {:.3f} s ({:.0f} times real time): {} steps, {} evaluations, {} events\n", simulated,
              r.integrate_seconds, simulated / std::max(r.integrate_seconds, 1e-9), s.steps, s.rhs_evaluations,
-             r.trajectory.events.size());
+             r.motion.events.size());
   fmt::print("{} (relative)\n", balances(s));
   if (r.budget.measured)
     fmt::print("errors of the outputs: discretisation {}, truncation {}, time {}, linearisation {}; total {}\n",
@@ -276,7 +289,7 @@ int run_command(const RunArguments& a, const CommonOptions& common) {
   ResultsFolder results(folder, scene, builtin_scene(a.scene) ? "" : a.scene);
   const InterruptGuard guard;
   const RunResult result = run_into(results, scene, a, common);
-  const IntegrationSummary& s = result.trajectory.summary;
+  const IntegrationSummary& s = result.motion.summary;
   const std::string wrong =
       is_balanced(s) ? ""
                      : fmt::format("{}: the motion in {}, or its energies, are wrong", balances(s), folder.string());

@@ -24,16 +24,20 @@ constexpr double unresolved = 0.1;                       // change of a frequenc
 constexpr double round_off = 1e-12;                      // of a frequency by any mesh
 constexpr int most_steps = 3;                            // to finer meshes
 constexpr double usual_fall = 0.5, singular_fall = 0.7;  // of errors, to the next mesh
+constexpr double coarse_fall = 0.8;  // of elements that are too few for the edges of the clamp, where errors gather
 
 bool is_solid(const Model& model) { return model.body && model.body->structure == "solid"; }
+
+/// Has the file any say in the sizes of elements?
+bool has_given_sizes(const SolidGrading& g) {
+  return g.sectors != 0 || g.rings != 0 || g.long_elements != 0 || g.end_layers >= 0 || g.first_layer != 0 ||
+         g.growth != 0 || g.corner_levels >= 0 || g.factor != 0 || g.edge_levels >= 0;
+}
 
 /// Is the mesh of a solid boom left to the program? It is where only the accuracy of hexahedra is given.
 bool follows_accuracy(const BodyScene& body) {
   const SolidOptions& s = body.solid;
-  const SolidGrading& g = s.grading;
-  return body.structure == "solid" && s.element == "hex" && s.order == 0 && g.sectors == 0 && g.rings == 0 &&
-         g.long_elements == 0 && g.end_layers < 0 && g.first_layer == 0 && g.growth == 0 && g.corner_levels < 0 &&
-         g.factor == 0 && g.edge_levels < 0;
+  return body.structure == "solid" && s.element == "hex" && s.order == 0 && !has_given_sizes(s.grading);
 }
 
 /// Of errors of one section's meshes; `own`: of the program's choice. Re-entrant edges along the boom are singular, and
@@ -80,15 +84,16 @@ std::optional<BoundedModes> finer(const Model& model, int steps, const EigenOpti
 
 /// Bounds of `m` where `share` of its error, or more, is its change to the other mesh. The k-th frequency of one mesh
 /// and the k-th of another, in ascending order, approach the same limit; behind one that is not resolved they may not.
-/// A change that is fifty times smaller than the largest is small by accident.
-FrequencyBounds bounds_of(const ModalBasis& m, const ModalBasis& other, double share) {
+/// A change of a solid that is fifty times smaller than the largest is small by accident.
+FrequencyBounds bounds_of(const BoundedModes& of, const ModalBasis& other, double share) {
+  const ModalBasis& m = of.basis;
   FrequencyBounds r{VectorXd::Constant(m.omega.size(), unknown), "from the next finer mesh"};
   const Index first = m.rigid_freedoms, n = std::min(m.omega.size(), other.omega.size()) - first;
   if (n <= 0) return r;
   const Eigen::ArrayXd change = (m.omega.segment(first, n).array() / other.omega.segment(first, n).array() - 1).abs();
   const auto resolved = std::ranges::find_if_not(change, [](double c) { return c < unresolved; }) - change.begin();
   if (resolved == 0) return r;
-  const double least = change.head(resolved).maxCoeff() / 50;
+  const double least = is_solid(of.model) ? change.head(resolved).maxCoeff() / 50 : 0;
   r.relative.segment(first, resolved) = change.head(resolved).max(least) / share + m.summary.residual_max + round_off;
   return r;
 }
@@ -98,7 +103,7 @@ FrequencyBounds bounds_of(const ModalBasis& m, const ModalBasis& other, double s
 BoundedModes climb(BoundedModes here, int most, double fall, const EigenOptions& options, int threads) {
   const Model start = here.model;
   const auto bound_by_coarser = [fall](BoundedModes& m, const BoundedModes& coarser, double seconds) {
-    m.bounds = bounds_of(m.basis, coarser.basis, (1 - fall) / fall);
+    m.bounds = bounds_of(m, coarser.basis, (1 - fall) / fall);
     m.bounds.how = "from the mesh one step coarser";
     m.bound_seconds += seconds + seconds_of(coarser);
   };
@@ -109,7 +114,7 @@ BoundedModes climb(BoundedModes here, int most, double fall, const EigenOptions&
       if (coarser) bound_by_coarser(here, *coarser, 0);
       return here;
     }
-    here.bounds = bounds_of(here.basis, next->basis, 1 - fall);
+    here.bounds = bounds_of(here, next->basis, 1 - fall);
     if (here.met() == true || steps == most) {
       here.bound_seconds += seconds_of(*next);
       return here;
@@ -129,7 +134,7 @@ double slowest_fall(const BodyScene& body) {
   double slowest = 0;
   for (const BeamSegment& s : body.geometry.segments)
     slowest = std::max({slowest, slowest_fall(s.start, own), slowest_fall(s.end, own)});
-  return slowest;
+  return has_given_sizes(body.solid.grading) ? std::max(slowest, coarse_fall) : slowest;
 }
 
 double FrequencyBounds::worst(int rigid_freedoms) const {

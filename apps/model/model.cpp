@@ -78,7 +78,7 @@ Material parse_material(const std::string& text) {
 Model refined(const Model& model, int steps) {
   require(model.body.has_value(), fmt::format("{}: a mesh file has no finer mesh", model.name));
   Model r = model;
-  r.mesh = mesh_of(*model.body, steps);
+  r.mesh = mesh_of(*model.body, model.body->structure == "beam" ? 2 * steps : steps);
   hold(r);
   return r;
 }

@@ -39,7 +39,8 @@ struct Model {
   std::string clamped;                 // node set of `body` that is held; empty: none
 };
 
-/// The model on a mesh that is so many steps finer than that of its body, as mesh_of.
+/// The model on a mesh that is so many steps finer than that of its body, as mesh_of. A step of beams is two orders:
+/// one alone may add shapes that a mode has no part of, by symmetry.
 /// @throws InputError where it is no boom, or has no mesh that is so coarse.
 Model refined(const Model&, int steps);
 

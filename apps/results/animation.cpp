@@ -46,10 +46,9 @@ class Rows {
     };
     for (size_t i = 0; i < scene_.joints.size(); ++i) {
       const JointScene& j = scene_.joints[i];
-      if (j.kind == JointKind::hinge) s.joints[i].coordinate = {value(row, j.name + ".angle")};
-      if (j.kind == JointKind::slider) s.joints[i].coordinate = {value(row, j.name + ".length")};
-      if (j.kind == JointKind::universal)
-        s.joints[i].coordinate = {value(row, j.name + ".angle1"), value(row, j.name + ".angle2")};
+      const ScalarOutputs scalars = scalar_outputs(j.kind);
+      for (size_t k = 0; k < scalars.values.size(); ++k)
+        s.joints[i].coordinate[k] = value(row, fmt::format("{}{}", j.name, scalars.values[k]));
       if (joint_type(j.kind).turns) s.joints[i].attitude = quaternion_of(vector(j.name + ".rotation"));
       if (joint_type(j.kind).floats) s.joints[i].position = vector(j.name + ".position");
     }

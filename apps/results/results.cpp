@@ -43,8 +43,8 @@ void print_rows(std::ostream& out, const OutputTable& table, size_t first) {
 std::string event_rows(const RunResult& r, size_t first) {
   const std::vector<std::string> hinges = joint_names(with_joints(r.scene));
   std::string out;
-  for (size_t i = first; i < r.trajectory.events.size(); ++i) {
-    const StopEvent& e = r.trajectory.events[i];
+  for (size_t i = first; i < r.motion.events.size(); ++i) {
+    const StopEvent& e = r.motion.events[i];
     out += fmt::format("{:.17g},{},{}\n", e.time, hinges[static_cast<size_t>(e.joint)], event_name(e));
   }
   return out;
@@ -131,7 +131,7 @@ ordered_json checks_of_bodies(const RunResult& r) {
 }  // namespace
 
 ordered_json summary_json(const RunResult& r, double write_seconds) {
-  const IntegrationSummary& s = r.trajectory.summary;
+  const IntegrationSummary& s = r.motion.summary;
   ordered_json j;
   j["scene"] = r.scene.name;
   j["version"] = version;
@@ -145,7 +145,7 @@ ordered_json summary_json(const RunResult& r, double write_seconds) {
   j["rhs_evaluations"] = s.rhs_evaluations;
   j["jacobian_evaluations"] = s.jacobian_evaluations;
   j["factorisations"] = s.factorisations;
-  j["events"] = r.trajectory.events.size();
+  j["events"] = r.motion.events.size();
   j["restarts"] = s.restarts;
   const double simulated = r.end.time - (r.scene.from ? r.scene.from->time() : 0);
   j["real_time_factor"] = simulated / std::max(r.integrate_seconds, 1e-9);
@@ -181,11 +181,11 @@ bool is_motion_frame(const std::string& name) {
 }
 
 void write_motion(const RunResult& r, const fs::path& folder, MotionFrames& frames) {
-  for (size_t i = 0; i < r.trajectory.time.size(); ++i) {
-    const double t = r.trajectory.time[i];
+  for (size_t i = 0; i < r.motion.time.size(); ++i) {
+    const double t = r.motion.time[i];
     if (t < frames.next - 1e-9 * r.scene.vtu_step) continue;
     const std::string name = fmt::format("motion_{:05d}.vtu", frames.files.size());
-    write_vtu(folder / name, picture(*r.tree, t, r.trajectory.y[i]));
+    write_vtu(folder / name, picture(*r.tree, t, r.motion.y[i]));
     frames.add({t, name}, r.scene.vtu_step);
   }
   write_pvd(folder / "motion.pvd", frames.files);

@@ -177,7 +177,7 @@ void ResultsFolder::write_rows(std::ostream& out, const OutputTable& table, size
 void ResultsFolder::add(const RunResult& r, size_t first) {
   if (!begun_) begin(r);
   const fs::path rows = path_ / "trajectory.csv", events = path_ / "events.csv";
-  const std::vector<StopEvent>& all = r.trajectory.events;
+  const std::vector<StopEvent>& all = r.motion.events;
   if (first == 0) {
     write_file(rows, [&](std::ostream& out) {
       copy_head(rows, rows_before_, out);
@@ -217,7 +217,7 @@ void ResultsFolder::write(const RunResult& r) {
 
 void ResultsFolder::write_state(const RunResult& r) {
   FlightState end = r.end;
-  end.events = kept_events_ + static_cast<int>(r.trajectory.events.size());
+  end.events = kept_events_ + static_cast<int>(r.motion.events.size());
   write_file(path_ / "state.toml", to_toml(end, r.scene.name));
 }
 

@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 
 namespace flexboom {
 
@@ -70,28 +71,23 @@ std::vector<std::string> marker_names(const BodyScene& body) {
   return names;
 }
 
+ScalarOutputs scalar_outputs(JointKind kind) {
+  static constexpr std::array<std::string_view, 1> angle = {".angle"}, length = {".length"}, rate = {".rate"};
+  static constexpr std::array<std::string_view, 2> angles = {".angle1", ".angle2"}, rates = {".rate1", ".rate2"};
+  if (kind == JointKind::hinge) return {angle, rate};
+  if (kind == JointKind::slider) return {length, rate};
+  if (kind == JointKind::universal) return {angles, rates};
+  return {};
+}
+
 std::vector<std::string> outputs_of(const Scene& scene) {
   std::vector<std::string> names;
   for (const JointScene& joint : scene.joints) {
-    const auto add = [&](const char* what) { names.push_back(joint.name + what); };
-    switch (joint.kind) {
-      case JointKind::fixed:
-        break;
-      case JointKind::hinge:
-        add(".angle"), add(".rate");
-        break;
-      case JointKind::slider:
-        add(".length"), add(".rate");
-        break;
-      case JointKind::universal:
-        add(".angle1"), add(".angle2"), add(".rate1"), add(".rate2");
-        break;
-      case JointKind::spherical:
-        add(".rotation"), add(".rate");
-        break;
-      case JointKind::free:
-        add(".rotation"), add(".rate"), add(".position"), add(".velocity");
-    }
+    const auto add = [&](std::string_view what) { names.push_back(fmt::format("{}{}", joint.name, what)); };
+    for (const std::string_view what : scalar_outputs(joint.kind).values) add(what);
+    for (const std::string_view what : scalar_outputs(joint.kind).rates) add(what);
+    if (joint_type(joint.kind).turns) add(".rotation"), add(".rate");
+    if (joint_type(joint.kind).floats) add(".position"), add(".velocity");
     if (joint.loads) add(".force"), add(".torque");
     if (joint.loads && joint.motion.size() == 1) add(".drive");
     for (size_t i = 1; joint.loads && joint.motion.size() > 1 && i <= joint.motion.size(); ++i)

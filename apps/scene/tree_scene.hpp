@@ -10,7 +10,9 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 /// What a file says of a scene with [[joints]]: any tree of bodies (`Multibody`), its names not yet looked up.
@@ -52,6 +54,12 @@ struct JointScene {
   bool loads = false;                                                // are forces and torques outputs?
   bool closes_loop = false;
 };
+
+/// What the outputs of angles and lengths, and of their rates, are called behind the name of the joint: ".angle".
+struct ScalarOutputs {
+  std::span<const std::string_view> values, rates;
+};
+ScalarOutputs scalar_outputs(JointKind);
 
 struct SpringScene {
   std::string name;

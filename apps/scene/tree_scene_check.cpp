@@ -178,7 +178,33 @@ class TreeCheck {
       faults_.add(path + ".drive", fmt::format("a {} joint has none; hinges and sliders have", type.name));
     motion(path, j, type);
     start(path, j, type);
+    inertia(path, j, type);
     if (j.closes_loop) loop(path, j);
+  }
+
+  /// A rigid body on which nothing hangs needs inertia about each axis that its joint turns it about. What hangs on it
+  /// is looked at when the scene is simulated.
+  void inertia(const std::string& path, const JointScene& j, const JointType& type) {
+    const auto body = std::ranges::find(scene_.bodies, j.b.body, &BodyScene::name);
+    if (body == scene_.bodies.end() || !body->rigid || type.floats || j.closes_loop || !j.motion.empty() ||
+        std::ranges::any_of(scene_.joints, [&](const JointScene& other) { return other.a.body == j.b.body; }) ||
+        std::ranges::any_of(scene_.wheels, [&](const WheelScene& wheel) { return wheel.body == j.b.body; }))
+      return;
+    constexpr double too_little = 1e-12;
+    const RigidScene& rigid = *body->rigid;
+    const Eigen::Matrix3d J =
+        rigid.inertia + centre_inertia(rigid.mass, Eigen::Vector3d(rigid.mass * (rigid.centre - j.b.point)));
+    const Eigen::Matrix3d axes = j.b.axes();
+    for (int k = 0; k < type.freedoms; ++k) {
+      const Freedom freedom = type.freedom[static_cast<size_t>(k)];
+      if (freedom < Freedom::turn_x) continue;
+      const int column = freedom == Freedom::turn_x ? 0 : freedom == Freedom::turn_y ? 1 : 2;
+      const double about = axes.col(column).dot(J * axes.col(column));
+      if (about > too_little * J.trace()) continue;
+      return faults_.add(path, fmt::format("turns body {} about an axis through its mass, where its inertia is {:.3g} "
+                                           "kg m^2; give it inertia, or a place away from its mass centre",
+                                           toml_reader::in_quotes(j.b.body), about));
+    }
   }
 
   void loop(const std::string& path, const JointScene& j) {

@@ -409,6 +409,7 @@ std::optional<ErrorBudget> budget_by_another(Scene& scene, Run& run, const RunHo
     m.budget.time = unknown;
     for (OutputErrors& o : m.budget.outputs) o.time = unknown;
   }
+  m.budget.measured = !hooks.stopped();
   return m.budget;
 }
 

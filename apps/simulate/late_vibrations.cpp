@@ -3,11 +3,14 @@
 #include "apps/base/deflection.hpp"
 #include "apps/simulate/output_errors.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace flexboom {
@@ -80,9 +83,12 @@ std::vector<Ago> rows_ago(const OutputTable& table, const ArrayXd& lag) {
 
 std::vector<std::string> prescribed_outputs(const Scene& scene) {
   std::vector<std::string> names;
-  for (const JointScene& j : scene.joints)
-    for (const char* what : {".angle", ".length", ".angle1", ".angle2", ".rate", ".rate1", ".rate2"})
-      if (!j.motion.empty()) names.push_back(j.name + what);
+  for (const JointScene& j : scene.joints) {
+    if (j.motion.empty()) continue;
+    const ScalarOutputs scalars = scalar_outputs(j.kind);
+    for (const auto whats : {scalars.values, scalars.rates})
+      for (const std::string_view what : whats) names.push_back(fmt::format("{}{}", j.name, what));
+  }
   return names;
 }
 

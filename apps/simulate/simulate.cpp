@@ -223,17 +223,6 @@ void add_words(const Run& run, RunResult& r) {
   r.warnings = r.scene.warnings;
 }
 
-void take(Run run, RunResult& r) {
-  r.bodies = std::move(run.bodies);
-  r.tree = std::move(run.tree);
-  r.trajectory = std::move(run.motion);
-  r.outputs = std::move(run.outputs);
-  r.end = std::move(run.end);
-  r.ledger = run.ledger;
-  r.prepare_seconds = run.prepare_seconds;
-  r.integrate_seconds = run.integrate_seconds;
-}
-
 }  // namespace
 
 std::string error_text(double error) { return std::isnan(error) ? "not measured" : fmt::format("{:.1e}", error); }
@@ -268,8 +257,8 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
       RunResult part = r;
       add_words(run, part);
       part.warnings.insert(part.warnings.end(), run.motion.warnings.begin(), run.motion.warnings.end());
-      take(std::move(run), part);
-      part.trajectory.summary.interrupted = false;  // not yet
+      static_cast<SimulatedMotion&>(part) = std::move(run);
+      part.motion.summary.interrupted = false;  // not yet
       so_far(part, first);
     };
   Run run = run_once(r.scene, of_run);
@@ -307,8 +296,8 @@ RunResult run_scene(const Scene& given, const RunHooks& asked,
   r.plan.insert(r.plan.end(), words.begin(), words.end());
   if (!warning.empty()) r.warnings.push_back(warning);
   add_warnings(run, r);
-  take(std::move(run), r);
-  if (r.scene.verify && !r.trajectory.summary.interrupted) r.checks = reference_checks(r, hooks);
+  static_cast<SimulatedMotion&>(r) = std::move(run);
+  if (r.scene.verify && !r.motion.summary.interrupted) r.checks = reference_checks(r, hooks);
   return r;
 }
 

@@ -25,24 +25,40 @@ struct EnergyOfRun {
   EnergyLedger ledger;
 };
 
-struct RunResult {
-  Scene scene;
+/// A motion of the bodies of a scene, and what is made of it.
+struct SimulatedMotion {
   std::vector<PreparedBody> bodies;  // as with_joints has them
-  TreeTrajectory trajectory;
+  TreeTrajectory motion;             // by whatever coordinates: the states are those of `tree`
   std::shared_ptr<const Tree> tree;  // of the joints that close no loop
   OutputTable outputs;
   FlightState end;                    // from which another run can go on
   std::optional<EnergyOfRun> ledger;  // none before the first row
+  double prepare_seconds = 0, integrate_seconds = 0;
+};
+
+/// How far a body bends in a flight: the largest elastic displacement of any of its points.
+struct Bending {
+  double size = 0;       // [m]
+  double of_length = 0;  // by the length of the body
+  double time = 0;       // [s]
+};
+
+/// One flight of a scene as it stands.
+struct Run : SimulatedMotion {
+  std::vector<Bending> bending;    // per body
+  std::vector<std::string> notes;  // for the plan
+};
+
+/// The flight that a scene asks for, after whatever flights that took.
+struct RunResult : SimulatedMotion {
+  Scene scene;
   ErrorBudget budget;
   std::vector<ReferenceCheck> checks;  // where the scene is to be verified
   std::vector<std::string> plan;       // what was chosen and why, one line each
   std::vector<std::string> warnings;
-  double prepare_seconds = 0;
-  double integrate_seconds = 0;  // of the run itself, without the repeats
   double budget_seconds = 0;
 };
 
-struct Run;
 class FlightsAhead;
 
 /// Beside a run.
@@ -79,27 +95,6 @@ std::string balances(const IntegrationSummary&);
 
 /// A relative error in words; "not measured" of what is unknown.
 std::string error_text(double);
-
-/// How far a body bends in a flight: the largest elastic displacement of any of its points.
-struct Bending {
-  double size = 0;       // [m]
-  double of_length = 0;  // by the length of the body
-  double time = 0;       // [s]
-};
-
-/// One flight of a scene as it stands.
-struct Run {
-  std::vector<PreparedBody> bodies;  // as with_joints has them
-  TreeTrajectory motion;             // by whatever coordinates: the states are those of `tree`
-  OutputTable outputs;
-  FlightState end;
-  std::vector<Bending> bending;  // per body
-  std::optional<EnergyOfRun> ledger;
-  double prepare_seconds = 0, integrate_seconds = 0;
-
-  std::shared_ptr<const Tree> tree;  // of the joints that close no loop
-  std::vector<std::string> notes;    // for the plan
-};
 
 /// What a scene asks of an integrator; `chosen`: the method where it leaves the choice. `max_steps` as of run_once.
 IntegratorOptions integrator_options(const Scene&, const RunHooks&, std::string_view chosen, long max_steps);

@@ -38,7 +38,9 @@ std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const Ou
             : fmt::format("differs by {:.1e} from relative coordinates by {}", error, reference->motion.summary.method);
     plan.push_back(
         fmt::format("{}{}{}; the integrator gets {:.0e}", of_time, energies, against, tight.step_tolerance()));
-    run = reference == nullptr ? std::move(next) : finer();
+    if (reference != nullptr) next = finer();
+    if (next.motion.summary.interrupted) throw NumericalError("interrupted");
+    run = std::move(next);
     flown = tight;
   }
 }

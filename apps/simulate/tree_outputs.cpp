@@ -66,21 +66,12 @@ class Columns {
 /// `centre`: where the scene has the mass centre, which flies along the orbit.
 void put_joint(Columns& out, const JointScene& joint, const JointState& s, const Vector3d& centre) {
   const std::string& name = joint.name;
-  switch (joint.kind) {
-    case JointKind::fixed:
-      return;
-    case JointKind::hinge:
-      return out.put(name, ".angle", s.coordinate[0]), out.put(name, ".rate", s.rate[0]);
-    case JointKind::slider:
-      return out.put(name, ".length", s.coordinate[0]), out.put(name, ".rate", s.rate[0]);
-    case JointKind::universal:
-      out.put(name, ".angle1", s.coordinate[0]), out.put(name, ".angle2", s.coordinate[1]);
-      return out.put(name, ".rate1", s.rate[0]), out.put(name, ".rate2", s.rate[1]);
-    case JointKind::spherical:
-    case JointKind::free:
-      out.put(name, ".rotation", rotation_vector(s.attitude)), out.put(name, ".rate", s.omega);
-  }
-  if (joint.kind != JointKind::free) return;
+  const ScalarOutputs scalars = scalar_outputs(joint.kind);
+  for (size_t i = 0; i < scalars.values.size(); ++i) out.put(name, scalars.values[i], s.coordinate[i]);
+  for (size_t i = 0; i < scalars.rates.size(); ++i) out.put(name, scalars.rates[i], s.rate[i]);
+  if (joint_type(joint.kind).turns)
+    out.put(name, ".rotation", rotation_vector(s.attitude)), out.put(name, ".rate", s.omega);
+  if (!joint_type(joint.kind).floats) return;
   Vector3d position = s.position;
   if (joint.a.body.empty()) position += joint.a.axes().transpose() * centre;
   out.put(name, ".position", position), out.put(name, ".velocity", s.velocity);

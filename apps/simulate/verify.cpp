@@ -60,7 +60,7 @@ std::vector<ReferenceCheck> reference_checks(const RunResult& r, const RunHooks&
   RunHooks quiet;
   quiet.interrupt = hooks.interrupt, quiet.bodies = hooks.bodies, quiet.ahead = hooks.ahead;
   std::vector<ReferenceCheck> checks;
-  const std::vector<Reference> all = references(scene, r.trajectory.summary.method, quiet);
+  const std::vector<Reference> all = references(scene, r.motion.summary.method, quiet);
   for (const Reference& reference : all) {
     if (hooks.stopped()) break;
     if (const Reference* next = &reference + 1; next != all.data() + all.size())

@@ -110,10 +110,8 @@ void check_quantities(const std::vector<Quantity>& quantities, const std::vector
   for (const Quantity& q : quantities) {
     if (is_there(q.output, columns)) continue;
     const std::vector<std::string_view> views(outputs.begin(), outputs.end());
-    const std::string near = toml_reader::nearest(q.output, views);
     throw InputError(fmt::format("--quantity {}: there is no output \"{}\"; {}there are {}", q.name, q.output,
-                                 near.empty() ? "" : fmt::format("did you mean \"{}\"? ", near),
-                                 fmt::join(columns, ", ")));
+                                 toml_reader::question(q.output, views), fmt::join(columns, ", ")));
   }
 }
 

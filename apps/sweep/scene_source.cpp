@@ -87,10 +87,8 @@ size_t entry_named(const std::string& path, const Value& array, const std::strin
     if (std::string other = name_of_entry(array.items[i]); !other.empty()) names.push_back(std::move(other));
   }
   const std::vector<std::string_view> views(names.begin(), names.end());
-  const std::string near = toml_reader::nearest(name, views);
   refuse_path(
-      path, fmt::format("there is no entry \"{}\"; {}there {}", name,
-                        near.empty() ? "" : fmt::format("did you mean \"{}\"? ", near),
+      path, fmt::format("there is no entry \"{}\"; {}there {}", name, toml_reader::question(name, views),
                         names.empty() ? fmt::format("are {} without names: give [index] or [*]", array.items.size())
                                       : fmt::format("are \"{}\"; or give [index] or [*]", fmt::join(names, "\", \""))));
 }

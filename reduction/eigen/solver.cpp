@@ -168,8 +168,14 @@ EigenPairs solve_modes_with(const EigenBackend& backend, const EigenProblem& p, 
     sigma = chosen ? free_shift(p, shifted, options.num_modes) : moved_down(sigma, stiffness_scale(p), attempt);
     if (!chosen) count *= 2;
   }
-  throw NumericalError("modes: no verified answer; " + note +
-                       "is the shift far inside the spectrum, or the body not held as said?");
+  const bool are_many = 4 * static_cast<Eigen::Index>(options.num_modes) > p.K.rows();
+  const std::string why =
+      are_many ? fmt::format(
+                     "{} modes of {} unknowns are asked for, and the highest are beyond any solver: ask for "
+                     "fewer, or take more elements",
+                     options.num_modes, p.K.rows())
+               : "is the shift far inside the spectrum, or the body not held as said?";
+  throw NumericalError("modes: no verified answer; " + note + why);
 }
 
 }  // namespace flexboom

@@ -171,7 +171,7 @@ TEST(NoBudget, AnUnbalancedMotionIsWarnedOf) {
   EXPECT_FALSE(is_warned_of(run_scene(scene, {})));
   scene.formulation = "multipliers";
   const RunResult r = run_scene(scene, {});
-  EXPECT_GT(r.trajectory.summary.energy_balance, 10 * scene.tolerance);
+  EXPECT_GT(r.motion.summary.energy_balance, 10 * scene.tolerance);
   EXPECT_TRUE(is_warned_of(r));
 }
 
@@ -312,10 +312,10 @@ a = { body = "hub", point = [0.3, 0.0, 0.0] }
 b = { body = "panel", marker = "root" }
 )toml",
                             "jitter.toml");
-  EXPECT_GT(run_scene(scene, {}).trajectory.summary.energy_balance, bearable_balance(scene.tolerance));
+  EXPECT_GT(run_scene(scene, {}).motion.summary.energy_balance, bearable_balance(scene.tolerance));
   scene.error_budget = true;
   const RunResult r = run_scene(scene, {});
-  EXPECT_LE(r.trajectory.summary.energy_balance, bearable_balance(scene.tolerance));
+  EXPECT_LE(r.motion.summary.energy_balance, bearable_balance(scene.tolerance));
   EXPECT_LT(r.scene.integrator_tolerance, scene.tolerance);
 }
 
@@ -388,7 +388,7 @@ TEST(BudgetOfAnyScene, OutlivesARepeatThatFails) {
         scene.tolerance = tolerance;
         const RunResult r = run_scene(scene, {});
         failed = std::isnan(r.budget.time);
-        EXPECT_EQ(r.trajectory.time.back(), 0.05);
+        EXPECT_EQ(r.motion.time.back(), 0.05);
         EXPECT_EQ(std::isnan(r.budget.total()), failed);
         EXPECT_EQ(any_has(r.warnings, "time not measured: "), failed);
       } catch (const NumericalError&) {

@@ -47,13 +47,13 @@ void expect_same(const RunResult& whole, const RunResult& first, const RunResult
     if (column(whole, name).cwiseAbs().maxCoeff() < 1e-15) continue;  // round-off of what is zero
     EXPECT_LT(difference(whole, later, name), outputs) << name;
   }
-  std::vector<StopEvent> events = first.trajectory.events;
-  events.insert(events.end(), later.trajectory.events.begin(), later.trajectory.events.end());
-  ASSERT_EQ(events.size(), whole.trajectory.events.size());
+  std::vector<StopEvent> events = first.motion.events;
+  events.insert(events.end(), later.motion.events.begin(), later.motion.events.end());
+  ASSERT_EQ(events.size(), whole.motion.events.size());
   for (size_t i = 0; i < events.size(); ++i) {
-    EXPECT_EQ(events[i].joint, whole.trajectory.events[i].joint) << i;
-    EXPECT_EQ(events[i].contact, whole.trajectory.events[i].contact) << i;
-    EXPECT_NEAR(events[i].time, whole.trajectory.events[i].time, event_times) << i;
+    EXPECT_EQ(events[i].joint, whole.motion.events[i].joint) << i;
+    EXPECT_EQ(events[i].contact, whole.motion.events[i].contact) << i;
+    EXPECT_NEAR(events[i].time, whole.motion.events[i].time, event_times) << i;
   }
 }
 
@@ -68,10 +68,10 @@ TEST_P(Continue, SportIsTheSameRunInTwoFlights) {
   const bool relative = GetParam() == "relative";
   scene.tolerance = relative ? 1e-9 : 1e-7;
   const RunResult whole = fly(scene, 0.6), first = fly(scene, 0.2137), later = fly(scene, 0.6, &first);
-  EXPECT_GE(later.trajectory.events.size(), 10u);
-  EXPECT_EQ(later.trajectory.time.front(), 0.2137);
+  EXPECT_GE(later.motion.events.size(), 10u);
+  EXPECT_EQ(later.motion.time.front(), 0.2137);
   expect_same(whole, first, later, relative ? 1e-8 : 1e-5, relative ? 1e-9 : 1e-6);
-  EXPECT_LT(later.trajectory.summary.energy_balance, relative ? 1e-8 : 1e-5);
+  EXPECT_LT(later.motion.summary.energy_balance, relative ? 1e-8 : 1e-5);
 }
 
 // A boom's ring after a bounce is over before a long step looks for the first time, and shakes the others all the same.
@@ -101,12 +101,12 @@ TEST(ContinueScene, WhatHasSettledStaysSettled) {
   scene.tolerance = 1e-2;
   const RunResult whole = fly(scene, 6), first = fly(scene, 4), later = fly(scene, 6, &first);
   int settled = 0;
-  for (const StopHistory& stop : first.trajectory.summary.stops) settled += stop.settled >= 0;
+  for (const StopHistory& stop : first.motion.summary.stops) settled += stop.settled >= 0;
   EXPECT_GT(settled, 0);
-  EXPECT_EQ(first.trajectory.events.size() + later.trajectory.events.size(), whole.trajectory.events.size());
-  ASSERT_EQ(later.trajectory.summary.stops.size(), first.trajectory.summary.stops.size());
-  for (size_t i = 0; i < first.trajectory.summary.stops.size(); ++i)
-    EXPECT_GE(later.trajectory.summary.stops[i].largest_rate, first.trajectory.summary.stops[i].largest_rate);
+  EXPECT_EQ(first.motion.events.size() + later.motion.events.size(), whole.motion.events.size());
+  ASSERT_EQ(later.motion.summary.stops.size(), first.motion.summary.stops.size());
+  for (size_t i = 0; i < first.motion.summary.stops.size(); ++i)
+    EXPECT_GE(later.motion.summary.stops[i].largest_rate, first.motion.summary.stops[i].largest_rate);
 }
 
 // Turns are commanded from the start of the scene on, whenever a run begins; nothing moves in the first ten seconds.
@@ -131,9 +131,9 @@ TEST_P(Continue, AfterTheMotionHasDied) {
     const double left = column(later, "energy.kinetic").maxCoeff();
     EXPECT_LT(left, 1e-12 * column(first, "energy.kinetic").maxCoeff());
     for (const RunResult* r : {&later, &latest}) {
-      EXPECT_TRUE(is_balanced(r->trajectory.summary)) << r->trajectory.summary.energy_balance;
-      EXPECT_LE(r->trajectory.summary.energy_balance, 1e-6);
-      EXPECT_LE(r->trajectory.summary.momentum_drift, 1e-6);
+      EXPECT_TRUE(is_balanced(r->motion.summary)) << r->motion.summary.energy_balance;
+      EXPECT_LE(r->motion.summary.energy_balance, 1e-6);
+      EXPECT_LE(r->motion.summary.momentum_drift, 1e-6);
       EXPECT_GE(r->end.largest.energy, first.end.largest.energy);
     }
   }
@@ -163,7 +163,7 @@ torque = "0.01*sin(pi*t)*(t < 2)"
   scene.formulation = GetParam();
   scene.error_budget = false;
   const RunResult first = fly(scene, 2.5), later = fly(scene, 4, &first);
-  EXPECT_TRUE(is_balanced(later.trajectory.summary)) << later.trajectory.summary.energy_balance;
+  EXPECT_TRUE(is_balanced(later.motion.summary)) << later.motion.summary.energy_balance;
   EXPECT_GE(later.end.largest.energy, column(first, "energy.kinetic").maxCoeff());
 }
 
@@ -175,8 +175,8 @@ TEST_P(Continue, NothingToBalance) {
     scene.formulation = GetParam();
     scene.error_budget = false;
     const RunResult r = fly(scene, 1);
-    EXPECT_EQ(r.trajectory.summary.energy_balance, 0);
-    EXPECT_EQ(r.trajectory.summary.momentum_drift, 0);
+    EXPECT_EQ(r.motion.summary.energy_balance, 0);
+    EXPECT_EQ(r.motion.summary.momentum_drift, 0);
   }
 }
 

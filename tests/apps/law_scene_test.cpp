@@ -81,10 +81,10 @@ RunResult run(const std::string& text, const std::string& formulation = "relativ
 
 void expect_same(const RunResult& a, const RunResult& b, double tolerance = 1e-6) {
   EXPECT_EQ(event_rows(a, 0).size() > 0, event_rows(b, 0).size() > 0);
-  ASSERT_EQ(a.trajectory.events.size(), b.trajectory.events.size()) << event_rows(a, 0) << event_rows(b, 0);
-  for (size_t i = 0; i < a.trajectory.events.size(); ++i) {
-    EXPECT_EQ(event_name(a.trajectory.events[i]), event_name(b.trajectory.events[i]));
-    EXPECT_NEAR(a.trajectory.events[i].time, b.trajectory.events[i].time, tolerance);
+  ASSERT_EQ(a.motion.events.size(), b.motion.events.size()) << event_rows(a, 0) << event_rows(b, 0);
+  for (size_t i = 0; i < a.motion.events.size(); ++i) {
+    EXPECT_EQ(event_name(a.motion.events[i]), event_name(b.motion.events[i]));
+    EXPECT_NEAR(a.motion.events[i].time, b.motion.events[i].time, tolerance);
   }
   for (const OutputDifference& d : compare_outputs(a.outputs, b.outputs, {})) {
     if (!d.name.starts_with("energy") && !d.name.ends_with("force") && !d.name.ends_with("torque") &&
@@ -92,8 +92,8 @@ void expect_same(const RunResult& a, const RunResult& b, double tolerance = 1e-6
       EXPECT_LT(d.error, 100 * tolerance) << d.name;
     }
   }
-  EXPECT_LT(a.trajectory.summary.energy_balance, 1e-7);
-  EXPECT_LT(b.trajectory.summary.energy_balance, 1e-7);
+  EXPECT_LT(a.motion.summary.energy_balance, 1e-7);
+  EXPECT_LT(b.motion.summary.energy_balance, 1e-7);
   ASSERT_TRUE(a.ledger && b.ledger);
   for (size_t k = 0; k < law_losses.size(); ++k)
     EXPECT_NEAR(a.ledger->ledger.laws[k], b.ledger->ledger.laws[k], tolerance);
@@ -135,7 +135,7 @@ TEST(LawScene, GoOnFromTheStateOfAnEarlierRun) {
       Scene half = scene;
       half.duration = 0.6;
       const RunResult first = run_scene(half, {}), second = run_scene(going_on(scene, first), {});
-      EXPECT_EQ(first.trajectory.events.size() + second.trajectory.events.size(), whole.trajectory.events.size());
+      EXPECT_EQ(first.motion.events.size() + second.motion.events.size(), whole.motion.events.size());
       EXPECT_NEAR(column(second, "hinge.angle").tail(1)[0], column(whole, "hinge.angle").tail(1)[0], 1e-6);
       for (size_t k = 0; k < law_losses.size(); ++k)
         EXPECT_NEAR(second.ledger->ledger.laws[k], whole.ledger->ledger.laws[k], 1e-6);
@@ -179,7 +179,7 @@ TEST(LawScene, StictionAtTheEndOfAnOrbitWithJ2) {
     scene.duration = 0.5;
     scene.integrator = integrator;
     const RunResult r = run_scene(scene, {});
-    EXPECT_EQ(r.trajectory.time.back(), 0.5) << integrator;
+    EXPECT_EQ(r.motion.time.back(), 0.5) << integrator;
     const VectorXd angle = column(r, "hinge.angle");
     EXPECT_LT((angle.array() - angle[0]).abs().maxCoeff(), 1e-9) << integrator;
   }

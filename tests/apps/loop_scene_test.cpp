@@ -87,8 +87,8 @@ TEST(LoopScene, FourBarFliesAndNamesItsRedundantRows) {
   EXPECT_TRUE(std::any_of(r.plan.begin(), r.plan.end(), [](const std::string& line) {
     return line == "joint pivot: starts at 1.52277, not 1.3, so that the loops close";
   }));
-  EXPECT_LT(r.trajectory.summary.constraint_drift, 1e-12);
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-7);
+  EXPECT_LT(r.motion.summary.constraint_drift, 1e-12);
+  EXPECT_LT(r.motion.summary.energy_balance, 1e-7);
   // The rocker by triangles: from the crank's tip to the pivot, then coupler and rocker on it (upper branch).
   const VectorXd t = column(r, "t"), pivot = column(r, "pivot.angle");
   for (Index i = 0; i < t.size(); ++i) {
@@ -265,10 +265,10 @@ TEST(LoopScene, EveryKindOfJointFliesAsInRelativeCoordinates) {
   const double energy = column(relative, "energy.kinetic").maxCoeff();
   for (const char* name : {"energy.kinetic", "energy.elastic", "energy.potential", "energy.dissipated", "energy.work"})
     EXPECT_LT((column(redundant, name) - column(relative, name)).cwiseAbs().maxCoeff(), 1e-7 * energy) << name;
-  ASSERT_GT(redundant.trajectory.events.size(), 0u);
-  ASSERT_EQ(redundant.trajectory.events.size(), relative.trajectory.events.size());
-  for (size_t i = 0; i < redundant.trajectory.events.size(); ++i)
-    EXPECT_NEAR(redundant.trajectory.events[i].time, relative.trajectory.events[i].time, 1e-7);
+  ASSERT_GT(redundant.motion.events.size(), 0u);
+  ASSERT_EQ(redundant.motion.events.size(), relative.motion.events.size());
+  for (size_t i = 0; i < redundant.motion.events.size(); ++i)
+    EXPECT_NEAR(redundant.motion.events[i].time, relative.motion.events[i].time, 1e-7);
 }
 
 }  // namespace

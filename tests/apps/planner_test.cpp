@@ -216,7 +216,7 @@ TEST(Planner, GeometricStiffnessIsSwitchedOnByMultipliersToo) {
   Scene scene = twisted("18");
   scene.duration = 0.1, scene.formulation = "multipliers";
   const RunResult r = run_scene(scene, {});
-  EXPECT_EQ(r.trajectory.summary.method, "ida");
+  EXPECT_EQ(r.motion.summary.method, "ida");
   EXPECT_TRUE(r.budget.has_stiffened);
   EXPECT_EQ(r.scene.bodies[1].stiffening, "on");
   EXPECT_EQ(r.tree->stiffening(1), Stiffening::on);
@@ -242,7 +242,7 @@ TEST(Planner, TheFormulationChangesNoChoice) {
   scene.formulation = "multipliers";
   const RunResult by_multipliers = run_scene(scene, {});
   EXPECT_EQ(by_multipliers.scene.formulation, "multipliers");
-  EXPECT_EQ(by_multipliers.trajectory.summary.method, "ida");
+  EXPECT_EQ(by_multipliers.motion.summary.method, "ida");
   EXPECT_EQ(by_multipliers.scene.bodies[1].shapes, relative.scene.bodies[1].shapes);
 }
 

@@ -22,7 +22,7 @@ double drift(const std::string& text, const std::string& formulation = "relative
   scene.formulation = formulation;
   scene.error_budget = false;
   scene.duration = 0.05;
-  return run_scene(scene, {}).trajectory.summary.momentum_drift;
+  return run_scene(scene, {}).motion.summary.momentum_drift;
 }
 
 TEST(MomentumDrift, IsUnknownWhereSomethingPushesOrHolds) {

@@ -48,7 +48,7 @@ TEST_P(TimeCourses, NoMethodOverlooksWhatTheyDo) {
     const RunResult r = turned_by(course.torque, method, formulation);
     const Eigen::VectorXd rate = column(r, "fly.rate.z");
     EXPECT_NEAR(rate[rate.size() - 1], course.impulse / 2, 1e-8 * course.impulse) << method << ", " << formulation;
-    EXPECT_LT(r.trajectory.summary.steps, 60'000) << method;
+    EXPECT_LT(r.motion.summary.steps, 60'000) << method;
   };
   for (const char* method : {"exponential", "adams", "bdf", "dirk", "erk"}) expect(method, "relative");
   expect("auto", "multipliers");
@@ -107,8 +107,8 @@ force = ["(t > 0.25)*(t < 0.75)*2e-3", "1e-3", "5e-4*t"]
                             "stub.toml");
   scene.integrator = "exponential";
   const RunResult r = run_scene(scene, {});
-  EXPECT_LT(r.trajectory.summary.steps, 200);
-  EXPECT_LT(r.trajectory.summary.energy_balance, scene.tolerance);
+  EXPECT_LT(r.motion.summary.steps, 200);
+  EXPECT_LT(r.motion.summary.energy_balance, scene.tolerance);
   scene.integrator = "dirk";
   const RunResult other = run_scene(scene, {});
   const auto work = [](const RunResult& run) { return column(run, "energy.work").tail(1)[0]; };

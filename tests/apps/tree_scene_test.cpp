@@ -55,7 +55,7 @@ TEST(TreeScene, Flies) {
   scene.duration = 0.5;
   scene.wheels[0].torque = {};
   const RunResult r = run_scene(scene, {});
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-3);
+  EXPECT_LT(r.motion.summary.energy_balance, 1e-3);
   EXPECT_GT(r.outputs.values.rows(), 10);
   EXPECT_TRUE(r.outputs.values.allFinite());
   const auto has = [&](const char* name) {
@@ -77,7 +77,7 @@ TEST(TreeScene, WingSatelliteMovesTheSameInBothFormulations) {
   const RunResult relative = run_scene(scene, {});
   scene.formulation = "multipliers";
   const RunResult multipliers = run_scene(scene, {});
-  const auto &one = relative.trajectory.events, &two = multipliers.trajectory.events;
+  const auto &one = relative.motion.events, &two = multipliers.motion.events;
   ASSERT_EQ(one.size(), 4u);  // outer, inner, outer lets go, outer again
   ASSERT_EQ(two.size(), one.size());
   for (size_t i = 0; i < one.size(); ++i) EXPECT_NEAR(one[i].time, two[i].time, 1e-6);
@@ -87,7 +87,7 @@ TEST(TreeScene, WingSatelliteMovesTheSameInBothFormulations) {
     EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-6 * a.cwiseAbs().maxCoeff()) << name;
   }
   EXPECT_GT(column(relative, "hub.rotation.z").tail(1)[0], 0.05);  // the wing opens the other way
-  EXPECT_LT(relative.trajectory.summary.energy_balance, 1e-8);
+  EXPECT_LT(relative.motion.summary.energy_balance, 1e-8);
 }
 
 TEST(TreeScene, TakesBodiesReducedBefore) {
@@ -275,6 +275,29 @@ TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
     const std::string fault = fault_of(with(good, c.old, c.replacement));
     EXPECT_NE(fault.find(c.words), std::string::npos) << c.replacement << "\n" << fault;
     EXPECT_EQ(fault.find("scene.toml:"), 0u) << fault;
+  }
+}
+
+TEST(TreeScene, ABodyHasInertiaWhereItsJointTurnsIt) {
+  const std::string scene = R"(format = "flexboom-scene-1"
+name = "pendulum"
+duration = 1.0
+[[bodies]]
+name = "bob"
+mass = 2.0
+inertia = [0, 0, 0]
+[[joints]]
+kind = "hinge"
+b = { body = "bob", point = [0, 0.5, 0] }
+)";
+  EXPECT_NO_THROW(validate(parse_scene(scene, "scene.toml")));
+  for (const auto& [kind, point] : {std::pair{"hinge", "[0, 0, 0]"},
+                                    {"hinge", "[0, 0, 1]"},
+                                    {"spherical", "[0, 0.5, 0]"},
+                                    {"universal", "[0, 0.5, 0]"}}) {
+    const std::string fault = fault_of(with(with(scene, "hinge", kind), "[0, 0.5, 0]", point));
+    EXPECT_EQ(fault.find("scene.toml:"), 0u) << fault;
+    EXPECT_NE(fault.find("joints[0]: turns body \"bob\" about an axis through its mass"), std::string::npos) << kind;
   }
 }
 

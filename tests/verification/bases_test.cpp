@@ -149,8 +149,8 @@ TEST_P(SlowBases, FlyAlikeInEveryPlace) {
           std::printf("%s: %d coordinates, %.1e apart (rigid %.1e)\n", name.c_str(), r.bodies[0].body.n(), error,
                       apart(rough, clamped));
           EXPECT_LT(error, structure == "solid" && !basis.root_held ? faces_apart : frames_apart) << name;
-          EXPECT_LT(r.trajectory.summary.energy_balance, 1e-6) << name;
-          EXPECT_EQ(r.trajectory.events.size(), clamped.trajectory.events.size()) << name;
+          EXPECT_LT(r.motion.summary.energy_balance, 1e-6) << name;
+          EXPECT_EQ(r.motion.events.size(), clamped.motion.events.size()) << name;
         } catch (const std::exception& fault) {
           ADD_FAILURE() << name << ": " << fault.what();
         }

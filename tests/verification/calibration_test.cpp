@@ -89,7 +89,7 @@ TEST(Calibration, ShakesMoreByCornersThanSmoothly) {
   std::printf("calibration: pointing error %.2e rad by a trapezoid, %.2e smoothly\n", worst_pointing(corners),
               worst_pointing(smooth));
   EXPECT_GT(worst_pointing(corners), 2.5 * worst_pointing(smooth));
-  EXPECT_LT(corners.trajectory.summary.momentum_drift, 1e-6);
+  EXPECT_LT(corners.motion.summary.momentum_drift, 1e-6);
 }
 
 /// Steps know the attitude alone, which is a thousand times larger.
@@ -141,8 +141,8 @@ TEST(Calibration, TightToleranceDoesNotChatter) {
   scene.turns[0].axis = Vector3d::UnitY();  // pushes no boom on its spring
   scene.tolerance = 1e-10;
   const RunResult r = run_scene(scene, {});
-  EXPECT_LT(r.trajectory.events.size(), 3000u);  // bounces down to 1e-10 of the first
-  EXPECT_LT(r.trajectory.summary.steps, 100'000);
+  EXPECT_LT(r.motion.events.size(), 3000u);  // bounces down to 1e-10 of the first
+  EXPECT_LT(r.motion.summary.steps, 100'000);
 }
 
 }  // namespace

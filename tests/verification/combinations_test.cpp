@@ -315,7 +315,7 @@ TEST(SlowCombinations, EveryPairOfFeaturesFliesAlikeInBothFormulations) {
           const RunResult by_method = run_scene(other, {});
           const double error = apart(relative, by_method, worst);
           EXPECT_LT(error, 1e-6) << name << " by " << method << ": " << worst;
-          EXPECT_EQ(relative.trajectory.events.size(), by_method.trajectory.events.size()) << name << " by " << method;
+          EXPECT_EQ(relative.motion.events.size(), by_method.motion.events.size()) << name << " by " << method;
           between_methods = std::max(between_methods, error);
         }
         scene.formulation = "multipliers", scene.integrator = "auto";
@@ -324,9 +324,9 @@ TEST(SlowCombinations, EveryPairOfFeaturesFliesAlikeInBothFormulations) {
         std::string worst;
         const double error = apart(relative, multipliers, worst);
         EXPECT_LT(error, 1e-6) << name << ": " << worst;
-        EXPECT_EQ(relative.trajectory.events.size(), multipliers.trajectory.events.size()) << name;
-        EXPECT_LT(relative.trajectory.summary.energy_balance, 1e-6) << name;
-        EXPECT_LT(multipliers.trajectory.summary.energy_balance, 1e-6) << name;
+        EXPECT_EQ(relative.motion.events.size(), multipliers.motion.events.size()) << name;
+        EXPECT_LT(relative.motion.summary.energy_balance, 1e-6) << name;
+        EXPECT_LT(multipliers.motion.summary.energy_balance, 1e-6) << name;
         EXPECT_EQ(no, impossible.end()) << name;
         ++flown, most = std::max(most, error);
       } catch (const std::exception& error) {

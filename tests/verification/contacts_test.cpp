@@ -41,11 +41,11 @@ TEST(Contacts, SportWrittenOutFliesAsTheSceneOfItsHub) {
     const VectorXd a = column(hub, name), b = column(tree, name);
     EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-6 * a.cwiseAbs().maxCoeff()) << name;  // two methods at 1e-9
   }
-  ASSERT_GT(hub.trajectory.events.size(), 5u);
-  ASSERT_GE(tree.trajectory.events.size(), 5u);
+  ASSERT_GT(hub.motion.events.size(), 5u);
+  ASSERT_GE(tree.motion.events.size(), 5u);
   for (size_t i = 0; i < 5; ++i) {
-    EXPECT_NEAR(tree.trajectory.events[i].time, hub.trajectory.events[i].time, 1e-8) << i;
-    EXPECT_EQ(tree.trajectory.events[i].contact, hub.trajectory.events[i].contact) << i;
+    EXPECT_NEAR(tree.motion.events[i].time, hub.motion.events[i].time, 1e-8) << i;
+    EXPECT_EQ(tree.motion.events[i].contact, hub.motion.events[i].contact) << i;
   }
 }
 
@@ -59,7 +59,7 @@ void expect_same_contacts(const RunResult& a, const RunResult& b, const std::str
     return of_joints;
   };
   const std::vector<std::string> of_a = names(a), of_b = names(b);
-  const auto &one = a.trajectory.events, &two = b.trajectory.events;
+  const auto &one = a.motion.events, &two = b.motion.events;
   EXPECT_EQ(one.size(), two.size()) << what;
   double worst = 0, fastest = 0;
   for (const StopEvent& e : one) fastest = std::max(fastest, std::abs(e.rate));
@@ -91,7 +91,7 @@ TEST(SlowContacts, OfSportAreTheSameByEveryMethodAndFormulation) {
   Scene scene = precise("sport");
   scene.duration = 4;
   const RunResult first = run_scene(scene, {});
-  ASSERT_GT(first.trajectory.events.size(), 10u);
+  ASSERT_GT(first.motion.events.size(), 10u);
   expect_same_by({"bdf", "adams", "dirk"}, scene, first);
   scene.integrator = "auto", scene.formulation = "multipliers";
   expect_same_contacts(first, run_scene(scene, {}), "multipliers");
@@ -104,14 +104,14 @@ TEST(SlowContacts, OfSportAreTheSameByEveryMethodAndFormulation) {
 TEST(SlowContacts, OfPanelsThatUnfoldAreTheSameByEveryMethod) {
   const Scene scene = precise("wing-satellite");
   const RunResult first = run_scene(scene, {});
-  ASSERT_EQ(first.trajectory.events.size(), 12u);
+  ASSERT_EQ(first.motion.events.size(), 12u);
   expect_same_by({"adams", "bdf"}, scene, first);
 }
 
 TEST(SlowContacts, OfALatchAreTheSameByEveryMethod) {
   const Scene scene = precise("latching-panel");
   const RunResult first = run_scene(scene, {});
-  ASSERT_EQ(first.trajectory.events.size(), 43u);
+  ASSERT_EQ(first.motion.events.size(), 43u);
   expect_same_by({"bdf", "dirk", "erk"}, scene, first);
 }
 
@@ -120,7 +120,7 @@ TEST(SlowContacts, OfATurnWithWheelsAreTheSameByEveryMethod) {
   Scene scene = precise("sport-calibration");
   scene.duration = 14.9;
   const RunResult first = run_scene(scene, {});
-  ASSERT_EQ(first.trajectory.events.size(), 7u);
+  ASSERT_EQ(first.motion.events.size(), 7u);
   expect_same_by({"adams", "bdf"}, scene, first);
 }
 

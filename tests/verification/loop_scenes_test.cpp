@@ -36,7 +36,7 @@ TEST(LoopScenes, SportFliesByMultipliersAsInRelativeCoordinates) {
     const VectorXd a = column(redundant, energy), b = column(relative, energy);
     EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-7 * b.maxCoeff()) << energy;
   }
-  const auto &found = redundant.trajectory.events, &wanted = relative.trajectory.events;
+  const auto &found = redundant.motion.events, &wanted = relative.motion.events;
   ASSERT_EQ(found.size(), wanted.size());
   ASSERT_GT(found.size(), 10u);
   for (size_t i = 0; i < found.size(); ++i) {
@@ -44,8 +44,8 @@ TEST(LoopScenes, SportFliesByMultipliersAsInRelativeCoordinates) {
     EXPECT_EQ(found[i].joint, wanted[i].joint) << i;
     EXPECT_EQ(found[i].contact, wanted[i].contact) << i;
   }
-  EXPECT_LT(redundant.trajectory.summary.constraint_drift, 1e-12);
-  EXPECT_LT(redundant.trajectory.summary.momentum_drift, 1e-8);
+  EXPECT_LT(redundant.motion.summary.constraint_drift, 1e-12);
+  EXPECT_LT(redundant.motion.summary.momentum_drift, 1e-8);
 }
 
 // ---- slider-crank ----
@@ -79,11 +79,11 @@ TEST(LoopScenes, RigidSliderCrankGoesAsInClosedForm) {
     error = std::max(
         {error, std::abs(way[i] - piston_way(angle)), std::abs(pin[i] - (phi - angle)), std::abs(wrist[i] + phi)});
   }
-  std::printf("rigid slider-crank: %.1e, drift %.1e, energy %.1e\n", error, r.trajectory.summary.constraint_drift,
-              r.trajectory.summary.energy_balance);
+  std::printf("rigid slider-crank: %.1e, drift %.1e, energy %.1e\n", error, r.motion.summary.constraint_drift,
+              r.motion.summary.energy_balance);
   EXPECT_LT(error, 1e-11);  // the joints decide, not the integration
-  EXPECT_LT(r.trajectory.summary.constraint_drift, 1e-12);
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-7);
+  EXPECT_LT(r.motion.summary.constraint_drift, 1e-12);
+  EXPECT_LT(r.motion.summary.energy_balance, 1e-7);
 }
 
 // The loop holds the rod's ends where positions of half a metre say, so its stiff stretching can not be known better
@@ -97,11 +97,10 @@ TEST(LoopScenes, ToleranceNearRoundOffOfAbsolutePlaces) {
     scene.tolerance = tolerance;
     runs.push_back(run_scene(scene, {}));
   }
-  EXPECT_LT(runs[1].trajectory.summary.steps, 20000);  // 2.4 times those at 1e-7
-  EXPECT_LT(runs[1].trajectory.summary.energy_balance, 1e-9);
+  EXPECT_LT(runs[1].motion.summary.steps, 20000);  // 2.4 times those at 1e-7
+  EXPECT_LT(runs[1].motion.summary.energy_balance, 1e-9);
   const double difference = largest(compare_outputs(runs[0].outputs, runs[1].outputs, {"rod.tip"}));
-  std::printf("slider-crank, 8 modes: 1e-7 against 1e-9 %.1e, %ld steps\n", difference,
-              runs[1].trajectory.summary.steps);
+  std::printf("slider-crank, 8 modes: 1e-7 against 1e-9 %.1e, %ld steps\n", difference, runs[1].motion.summary.steps);
   EXPECT_GT(difference, 0);
   EXPECT_LT(difference, 1e-6);
 }
@@ -111,7 +110,7 @@ TEST(LoopScenes, ToleranceNearRoundOffOfAbsolutePlaces) {
 TEST(LoopScenes, StiffDampedRodDoesNotSetTheSteps) {
   for (const double speed : {50.1, 52.0}) {
     const RunResult r = run_scene(slider_crank(speed), {});
-    EXPECT_LT(r.trajectory.summary.steps, 5000) << speed;  // 2400
+    EXPECT_LT(r.motion.summary.steps, 5000) << speed;  // 2400
   }
 }
 
@@ -247,8 +246,8 @@ Vector2d errors_against_pinned_beam(double speed, bool tension) {
   Scene scene = slider_crank(speed);
   scene.bodies[1].stiffening = tension ? "auto" : "off";
   const RunResult r = run_scene(scene, {});
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-6);
-  EXPECT_LT(r.trajectory.summary.constraint_drift, 1e-12);
+  EXPECT_LT(r.motion.summary.energy_balance, 1e-6);
+  EXPECT_LT(r.motion.summary.constraint_drift, 1e-12);
   VectorXd tip;
   const Deflection wanted =
                        PinnedBeam(scene.bodies[1], scene.bodies[2].rigid->mass, speed, tension).at(column(r, "t"), tip),

@@ -52,14 +52,13 @@ TEST(PaperFigures, ElasticCoordinatePeaksAtEachStopContact) {
     const std::vector<double> q = column(r, std::string(boom) + ".q1");
     const auto at = [&](double t) { return static_cast<size_t>(t / r.scene.output_step); };
     int contacts = 0;
-    for (size_t i = 0; i + 1 < r.trajectory.events.size(); ++i) {
-      const StopEvent& e = r.trajectory.events[i];
+    for (size_t i = 0; i + 1 < r.motion.events.size(); ++i) {
+      const StopEvent& e = r.motion.events[i];
       if (r.tree->scene().joints[static_cast<size_t>(e.joint)].name != boom || !e.contact || std::abs(e.rate) < 0.02)
         continue;
-      const auto release =
-          std::find_if(r.trajectory.events.begin() + static_cast<std::ptrdiff_t>(i) + 1, r.trajectory.events.end(),
-                       [&](const StopEvent& f) { return f.joint == e.joint; });
-      if (release == r.trajectory.events.end()) break;
+      const auto release = std::find_if(r.motion.events.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+                                        r.motion.events.end(), [&](const StopEvent& f) { return f.joint == e.joint; });
+      if (release == r.motion.events.end()) break;
       // The largest deflection from one free flight to the next lies while the stop is closed, and is a multiple of
       // that before.
       const double flight = 0.8 * (release->time - e.time);
@@ -132,8 +131,8 @@ TEST(PaperFigures, AttitudeIsReportedInTheOrbitFrame) {
 
 TEST(Sport, EnergyAndMomentaBalance) {
   const RunResult& r = first_second();
-  EXPECT_LT(r.trajectory.summary.energy_balance, 2e-7);  // a fifth of the tolerance
-  EXPECT_LT(r.trajectory.summary.momentum_drift, 1e-7);
+  EXPECT_LT(r.motion.summary.energy_balance, 2e-7);  // a fifth of the tolerance
+  EXPECT_LT(r.motion.summary.momentum_drift, 1e-7);
   EXPECT_GT(column(r, "energy.dissipated").back(), 0.9 * column(r, "energy.elastic").front());
 }
 
@@ -247,7 +246,7 @@ TEST(Sport, BouncesThatAreLeftOutStayUnderTheTolerance) {
   const RunResult judged = run_scene(scene, {});
   scene.tolerance = 1e-9, scene.settle = 1e-13;
   const RunResult all = run_scene(scene, {});
-  EXPECT_GT(all.trajectory.events.size(), judged.trajectory.events.size() + 20);
+  EXPECT_GT(all.motion.events.size(), judged.motion.events.size() + 20);
   EXPECT_LT(largest(compare_outputs(judged.outputs, all.outputs, {})), 1e-8);
 }
 
@@ -277,17 +276,17 @@ Scene conservative(double duration) {
 
 TEST(Sport, WithoutDampingKeepsEnergyAndMomentum) {
   const RunResult r = run_scene(conservative(1), {});
-  EXPECT_EQ(r.trajectory.summary.method, "exponential");
+  EXPECT_EQ(r.motion.summary.method, "exponential");
   EXPECT_EQ(column(r, "energy.dissipated").back(), 0);
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-9);
-  EXPECT_LT(r.trajectory.summary.momentum_drift, 1e-11);
+  EXPECT_LT(r.motion.summary.energy_balance, 1e-9);
+  EXPECT_LT(r.motion.summary.momentum_drift, 1e-11);
 }
 
 TEST(SlowSport, WithoutDampingKeepsEnergyAndMomentumOver30Seconds) {
   const RunResult r = run_scene(conservative(30), {});
-  EXPECT_GT(r.trajectory.events.size(), 1000U);
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-8);
-  EXPECT_LT(r.trajectory.summary.momentum_drift, 1e-8);
+  EXPECT_GT(r.motion.events.size(), 1000U);
+  EXPECT_LT(r.motion.summary.energy_balance, 1e-8);
+  EXPECT_LT(r.motion.summary.momentum_drift, 1e-8);
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ TEST(TreeScenes, SpinUpFollowsTheGeometricallyExactBeam) {
   EXPECT_TRUE(r.warnings.empty());
   RecordProperty("error", std::to_string(error / extremum));
   std::printf("spin-up: %.3e of the extremum, axial %.3e m, energy %.1e\n", error / extremum, axial,
-              r.trajectory.summary.energy_balance);
+              r.motion.summary.energy_balance);
 }
 
 TEST(TreeScenes, SpinUpWithoutStiffeningIsWarnedAbout) {
@@ -136,8 +136,8 @@ TEST(TreeScenes, TumblingIsJacobis) {
   std::printf("tumbling: rate %.2e, attitude %.2e\n", rate, attitude);
   EXPECT_LT(rate, 1e-10);  // tolerance 1e-12, unstable axis
   EXPECT_LT(attitude, 1e-9);
-  EXPECT_LT(r.trajectory.summary.momentum_drift, 1e-12);
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-12);
+  EXPECT_LT(r.motion.summary.momentum_drift, 1e-12);
+  EXPECT_LT(r.motion.summary.energy_balance, 1e-12);
 }
 
 // ---- two-link arm ----
@@ -257,8 +257,8 @@ TEST(TreeScenes, FlexibleAppendageHasTheFrequenciesOfTheFreeBeamWithItsHub) {
 TEST(TreeScenes, FlexibleAppendageKeepsEnergyAndMomenta) {
   const Scene scene = scene_named("flexible-appendage");
   const RunResult r = run_scene(scene, {});
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-5);
-  EXPECT_LT(r.trajectory.summary.momentum_drift, scene.tolerance);  // the integrator knows nothing of momenta
+  EXPECT_LT(r.motion.summary.energy_balance, 1e-5);
+  EXPECT_LT(r.motion.summary.momentum_drift, scene.tolerance);  // the integrator knows nothing of momenta
   EXPECT_GT(column(r, "panel.tip.y").cwiseAbs().maxCoeff(), 1e-4);
   EXPECT_EQ(column(r, "clamp.torque.z").size(), r.outputs.values.rows());
 }
@@ -326,10 +326,10 @@ TEST(TreeScenes, WireSpinnerFliesSteadily) {
   // Out of the plane the wires swing near Omega sqrt(1 + 1.5 r / L) with the size they were given.
   const VectorXd angle = column(r, "east.angle2");
   EXPECT_NEAR(angle.cwiseAbs().maxCoeff(), 0.02, 1e-3);
-  EXPECT_LT(r.trajectory.summary.momentum_drift, 1e-6);
-  EXPECT_LT(r.trajectory.summary.energy_balance, 1e-5);
-  std::printf("wires: %ld steps, energy %.1e, momentum %.1e\n", r.trajectory.summary.steps,
-              r.trajectory.summary.energy_balance, r.trajectory.summary.momentum_drift);
+  EXPECT_LT(r.motion.summary.momentum_drift, 1e-6);
+  EXPECT_LT(r.motion.summary.energy_balance, 1e-5);
+  std::printf("wires: %ld steps, energy %.1e, momentum %.1e\n", r.motion.summary.steps, r.motion.summary.energy_balance,
+              r.motion.summary.momentum_drift);
 }
 
 // Stiffness that a spin makes is in the linear part, too: from the start, or once the spin has come.
@@ -347,7 +347,7 @@ TEST(TreeScenes, MoreModesOfWhatSpinsDoNotShrinkTheStep) {
         b.modes = modes;
         for (BeamSegment& s : b.geometry.segments) s.elements = std::max(s.elements, 16);
       }
-      const IntegrationSummary s = run_scene(scene, {}).trajectory.summary;
+      const IntegrationSummary s = run_scene(scene, {}).motion.summary;
       EXPECT_EQ(s.method, "exponential") << row.scene;
       std::printf("%s, %d modes: %ld steps, %ld evaluations\n", row.scene, modes, s.steps, s.rhs_evaluations);
       return s;
@@ -362,7 +362,7 @@ TEST(TreeScenes, MoreModesOfWhatSpinsDoNotShrinkTheStep) {
 
 TEST(TreeScenes, LatchingPanelIsCaughtAndKeepsItsAngle) {
   const RunResult r = run_scene(scene_named("latching-panel"), {});
-  const std::vector<StopEvent>& events = r.trajectory.events;
+  const std::vector<StopEvent>& events = r.motion.events;
   const auto count = [&](EventKind kind) { return std::ranges::count(events, kind, &StopEvent::kind); };
   EXPECT_GE(count(EventKind::impact), 1);
   ASSERT_EQ(count(EventKind::latch), 1);
