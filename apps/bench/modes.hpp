@@ -20,8 +20,8 @@ struct ModesBench {
   double difference = 0;  // largest relative difference of the frequencies of both
 };
 
-/// The first ten frequencies of the clamped boom 4 of SPORT in 3D elasticity [Hz]: bending and extension from a Ritz
-/// solution in harmonics that is converged to 4e-8, torsion exact, sqrt(G / rho) / (4 L).
+/// The first ten frequencies of the clamped boom 4 of SPORT in 3D elasticity [Hz]. Bending and extension come from a
+/// Ritz solution in harmonics that is converged to 4e-8. Torsion is exact: sqrt(G / rho) / (4 L).
 std::vector<double> boom4_reference_hz();
 
 /// Measures every family of elements on a ladder of meshes, smallest first; a ladder ends where its next rung would

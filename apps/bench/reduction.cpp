@@ -152,8 +152,8 @@ ReducedBody changed(const ReducedBody& body, const MatrixXd& X) {
   return result;
 }
 
-/// Coordinates of `body` that are those of `reference` (of unit modal mass) but for the mesh: each group turned as near
-/// to its counterpart as it can be. None where the groups differ.
+/// Coordinates of `body` that are those of `reference` (of unit modal mass) but for the mesh. Each group of modes is
+/// turned as near to its counterpart as it can be. There are none where the groups differ.
 std::optional<MatrixXd> matching(const ReducedBody& body, const ReducedBody& reference) {
   const MatrixXd scaled = unit_mass(body);
   const MatrixXd L = coupling(changed(body, scaled)), L_reference = coupling(reference);

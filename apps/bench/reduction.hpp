@@ -29,8 +29,9 @@ struct ReductionBench {
 constexpr std::array<const char*, 8> invariant_names = {"m", "mc0", "J0", "Ct", "Cr0", "Cr1", "J1", "J2"};
 using InvariantErrors = std::array<double, invariant_names.size()>;
 
-/// Largest relative errors of the invariants of the first ten modes, against a finer mesh: relative to the largest
-/// entry, mode by mode of unit modal mass, pairs as subspaces. NaN where the mesh orders the modes otherwise.
+/// Largest errors of the invariants of the first ten modes, against a finer mesh. An error is relative to the largest
+/// entry. Modes of unit modal mass are compared one by one, pairs as subspaces. An error is NaN where the mesh orders
+/// the modes otherwise.
 struct InvariantsBench {
   std::string family, model;
   int unknowns = 0;

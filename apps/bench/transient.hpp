@@ -21,12 +21,13 @@ struct TransientBench {
   std::string failure;  // why there is nothing above
 };
 
-/// Work against precision: every method at tolerances 1e-2 to 1e-9. The scenes are those named (paths or built-in), or
-/// else SPORT with 2 and with 8 modes per boom, without damping, and tumbling. The reference of a method is another one
-/// at 1e-11, or at the next tolerance at which it does not fail: bdf, or adams where nothing is damped; for that one,
-/// exponential, or adams for scenes with joints. "ida" is the formulation by multipliers. A method ends
-/// where its next tolerance would take longer than `longest` seconds, or comes near that of the reference. A scene that
-/// closes a loop has one method, which is its own reference. Calls `seen` after each row.
+/// Work against precision: every method at tolerances 1e-2 to 1e-9. The scenes are those named (paths or built-in).
+/// Without names they are SPORT with 2 and with 8 modes per boom, without damping, and tumbling. The reference of a
+/// method is a run of another method. Its tolerance is 1e-11, or the next at which that method does not fail. The other
+/// method is bdf, or adams where nothing is damped. The reference of that one is exponential, or adams where joints
+/// have laws. "ida" is the formulation by multipliers. A method ends where its next tolerance would take longer than
+/// `longest` seconds, or comes near that of the reference. A scene that closes a loop has one method, which is its own
+/// reference. Calls `seen` after each row.
 std::vector<TransientBench> bench_transient(const std::vector<std::string>& scenes, double longest,
                                             const std::function<void(const TransientBench&)>& seen);
 

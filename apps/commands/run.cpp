@@ -95,8 +95,8 @@ void override_modes(Scene& scene, const std::string& text) {
   }
 }
 
-/// Bodies get the modes, elements and stiffening that they have in another scene of the same bodies, and the integrator
-/// the tolerance that it has there.
+/// Bodies get the modes, elements and stiffening that they have in another scene of the same bodies. The integrator
+/// gets the tolerance that it has there.
 void take_plan(Scene& scene, const std::filesystem::path& from) {
   const Scene planned = load_scene((std::filesystem::is_directory(from) ? from / "scene.toml" : from).string());
   if (planned.step_tolerance() < scene.tolerance) scene.integrator_tolerance = planned.step_tolerance();

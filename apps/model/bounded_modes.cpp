@@ -83,8 +83,8 @@ std::optional<BoundedModes> finer(const Model& model, int steps, const EigenOpti
 }
 
 /// Bounds of `m` where `share` of its error, or more, is its change to the other mesh. The k-th frequency of one mesh
-/// and the k-th of another, in ascending order, approach the same limit; behind one that is not resolved they may not.
-/// A change of a solid that is fifty times smaller than the largest is small by accident.
+/// and the k-th of another, in ascending order, approach the same limit. Behind a frequency that is not resolved they
+/// may not. A change of a solid that is fifty times smaller than the largest is small by accident.
 FrequencyBounds bounds_of(const BoundedModes& of, const ModalBasis& other, double share) {
   const ModalBasis& m = of.basis;
   FrequencyBounds r{VectorXd::Constant(m.omega.size(), unknown), "from the next finer mesh"};

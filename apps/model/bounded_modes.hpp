@@ -34,9 +34,10 @@ struct BoundedModes {
   std::optional<bool> met() const;
 };
 
-/// Of the discretisation errors of a boom, at most: what is left of them on the next finer mesh. 0.5, or 0.7 where
-/// edges along it are singular (slits, rectangular tubes). Meshes of the program's choice have 0.25 for round bars, 0.4
-/// for tubes, 0.35 for rectangles of less than one to four: measured on 25 booms were 0.23, 0.32 and 0.28 at most.
+/// The largest part of a boom's discretisation errors that is left on the next finer mesh. It is 0.5, or 0.7 where
+/// edges along the boom are singular (slits, rectangular tubes). Meshes of the program's choice have 0.25 for round
+/// bars, 0.4 for tubes, 0.35 for rectangles of less than one to four. Measured on 25 booms were 0.23, 0.32 and 0.28 at
+/// most.
 double slowest_fall(const BodyScene&);
 
 /// Modes of a model, each frequency with a bound from a mesh of the same boom that is one step finer (`refined`).
@@ -46,8 +47,9 @@ double slowest_fall(const BodyScene&);
 /// is never less than a fiftieth of the largest. Where the change is a tenth of the frequency or more, the coarser mesh
 /// resolves neither this mode nor those above it, whose order may change.
 ///
-/// A solid boom of which no more than the accuracy is given (SolidOptions) goes on to finer meshes until it is met: one
-/// step, then one of its own (`tuned`) and three steps from there at most, none of more than 140 000 unknowns.
+/// A solid boom of which no more than the accuracy is given (SolidOptions) goes on to finer meshes until the accuracy
+/// is met. It takes one step. It then takes a mesh of its own (`tuned`), and three steps from there at most. No mesh
+/// has more than 140 000 unknowns.
 /// @throws InputError, NumericalError as clamped_modes.
 BoundedModes bounded_modes(Model, const EigenOptions&, int threads);
 

@@ -9,8 +9,8 @@
 /// What bodies look like.
 namespace flexboom {
 
-/// A box about the mass centre of a body, with edges: of this size along the axes of the body [m], or where that is
-/// zero the box of equal mass and inertia.
+/// A box about the mass centre of a body, with edges. `size`: its sides along the axes of the body [m]. Where `size` is
+/// zero, the box has the mass and inertia of the body.
 DisplayShape box_of(const ReducedBody&, const Eigen::Vector3d& size = Eigen::Vector3d::Zero());
 
 /// Adds the lines and triangles of a shape as cells of a grid in which its points begin at `first`.

@@ -199,8 +199,9 @@ VectorXd unit_load(const ReducedBody& body, const Coordinate& load) {
   return S.row(axis).transpose();
 }
 
-/// Some of the modes, and of each static shape what these modes leave of its deflection: the whole body has the rest of
-/// it in modes that are not chosen. Its coordinates are orthogonal, modes first.
+/// A body with the chosen modes and the static shapes. Of each static shape it has the deflection that the chosen modes
+/// leave. The whole body has the rest of that deflection in modes that are not chosen. The coordinates of the result
+/// are orthogonal, modes first.
 ReducedBody with_chosen_modes(const ReducedBody& whole, const std::vector<int>& chosen, int modes) {
   const int statics = whole.n() - modes;
   MatrixXd rest(whole.n(), statics);

@@ -38,8 +38,8 @@ bool is_bearable(const Mesh&);
 
 /// Geometry -> mesh -> K, M -> basis -> reduced body, or the closed form, or the body that the scene gives.
 /// `refine` raises the polynomial order, for error estimates; of a body from a file it takes the finer elements that
-/// the file has. A solid body is kept in the folder `keep`, if one is given, and read from there as long as what it is
-/// made of is the same. @throws InputError, NumericalError.
+/// the file has. A solid body is kept in the folder `keep`, if one is given. It is read from there as long as what it
+/// is made of is the same. @throws InputError, NumericalError.
 PreparedBody prepare_body(const BodyScene&, int refine = 0, const std::filesystem::path& keep = {});
 
 /// Bodies that were made, for runs with equal ones. They are told apart by all that they are made of. Threads may share

@@ -38,8 +38,8 @@ std::vector<std::string> static_shapes_of_markers(const Model& model, const Redu
   return places.size() > few ? std::vector<std::string>{} : static_shapes_at(places);
 }
 
-/// With as many more modes as the elements have, eight at most; with those of all directions beside a plane's, where
-/// the hinge lets them be told apart.
+/// With as many more modes as the elements have, eight at most. Where the hinge lets them be told apart, modes of all
+/// directions stand beside those of a plane.
 std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions o, const ReducedBody& kept,
                                            int threads) {
   o.select.reset();

@@ -8,8 +8,8 @@
 
 namespace flexboom {
 
-/// Corrections of a basis that stretch and twist a boom at its free end, where `body` has no mode that does: those of a
-/// slender boom are beyond many that bend. `clamped`: the node set that is held.
+/// Corrections of a basis that stretch and twist a boom at its free end, where `body` has no mode that does. In a
+/// slender boom such modes come after many that bend. `clamped`: the node set that is held.
 std::vector<std::string> static_shapes_beside(const ReducedBody& body, const std::string& clamped);
 
 /// Corrections of all six loads at a node set, or at each of several.

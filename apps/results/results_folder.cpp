@@ -155,7 +155,8 @@ void ResultsFolder::begin(const RunResult& r) {
   require(head.header == header,
           fmt::format("--continue: {} has other columns than this run; give another folder by --out", rows.string()));
   rows_before_ = head.bytes;
-  // Not by their times: of two at the time of the state, one may be in it and one may be what a killed run saw next.
+  // Not by their times: two events may be at the time of the state. One may be in it, the other what a killed run saw
+  // next.
   events_before_ =
       head_of(path_ / "events.csv", true, [left = kept_events_](double) mutable { return left-- > 0; }).rows;
   skips_first_ = start_ > 0 && !on_grid(start_, r.scene.output_step);

@@ -16,8 +16,8 @@
 #include <set>
 #include <utility>
 
-// Comparisons are written so that NaN fails them where a value stands alone, and passes where two values are compared:
-// then the fault is reported at the value that is NaN, once.
+// Comparisons of a value that stands alone are written so that NaN fails them. Comparisons of two values are written so
+// that NaN passes them. So the fault is reported once, at the value that is NaN.
 
 namespace flexboom {
 

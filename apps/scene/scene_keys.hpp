@@ -112,8 +112,8 @@ std::vector<std::string> outputs_of(const Scene&);
 /// The joint of the body whose attitude against the LVLH frame is an output; one behind the last where no body flies.
 size_t first_that_flies(const Scene&);
 
-/// A direction rounded by hand or by arithmetic is made a unit vector; one that is so to round-off stays bit for bit,
-/// so that a scene that was written out reads back the same.
+/// A direction rounded by hand or by arithmetic is made a unit vector. One that is a unit vector to round-off stays bit
+/// for bit. So a scene that was written out reads back the same.
 Eigen::Vector3d unit_direction(const Eigen::Vector3d&);
 Eigen::Vector3d normal_to(const Eigen::Vector3d& direction, const Eigen::Vector3d& unit);
 

@@ -40,7 +40,7 @@ BodyComparison compare_with_eq14(const BodyScene&, int count, int elements);
 /// Why eq. 14 says nothing of a body; empty: it does.
 std::string not_comparable(const BodyScene&);
 
-/// One transient of a scene with each model of the bodies that are comparable in turn against eq. 14; geometric
+/// One transient of a scene with each model of the bodies that are comparable, in turn, against eq. 14. Geometric
 /// stiffness, which eq. 14 does not have, is left out.
 struct TransientComparison {
   std::string model;

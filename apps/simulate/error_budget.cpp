@@ -112,8 +112,9 @@ struct Repeats {
     return difference(run.outputs, other.outputs, scene);
   }
 
-  /// Differences of the outputs of another flight. Those that count must not be its own errors of time, which contacts
-  /// can make many tolerances: it is flown again with a digit more, where they are not far beyond that.
+  /// Differences of the outputs of another flight. Those that count must not be that flight's own errors of time, which
+  /// contacts can make many tolerances. Where they are not far beyond the tolerance, the scene is flown again with a
+  /// digit more.
   std::vector<OutputDifference> change(const Run&, const Scene& other, int refine = 0) const;
 };
 
@@ -181,7 +182,7 @@ std::optional<Beyond> modes_beyond(const Scene& scene, const Scene& flown, const
   return r;
 }
 
-/// What they change, and what still more would: a motion converges like 1 / n^2 or faster, so that as many modes more
+/// What they change, and what still more would. A motion converges like 1 / n^2 or faster, so that as many modes more
 /// change three quarters of the error or more. A jump of an acceleration rings all modes of a body, and a load of its
 /// joint converges like their effective mass: as 1 / n. What as many modes more change is then half of the error.
 Finding truncation_of(std::optional<Beyond> beyond, const Run& run, const Scene& flown, double time_error,
@@ -265,9 +266,9 @@ bool is_asked_for(const Scene& scene, const std::string& output) {
                              [&](const std::string& text) { return wanted_output(text).name == output; });
 }
 
-/// What geometric stiffness changes where it is left out, and what then is left out still: the square of the
-/// deflection, and vibrations whose frequency depends on it. Where it changes too much and the scene leaves it open,
-/// the scene has it from then on, and a run with it takes the place of `run`.
+/// What geometric stiffness changes where it is left out, and what is left out even with it. The latter is the square
+/// of the deflection, and vibrations whose frequency depends on it. Where geometric stiffness changes too much and the
+/// scene leaves it open, the scene has it from then on. A run with it then takes the place of `run`.
 double linearisation_error(Scene& scene, Scene& flown, Run& run, Measuring& m) {
   if (const ReducedBody* body = any_without_stiffness(run, flown)) {
     m.missing("linearisation", fmt::format("body {} has no geometric stiffness", body->name));

@@ -27,9 +27,9 @@ struct ModesBeyond {
   int of(int kept) const { return as_many ? std::max(least, kept) : least; }
 };
 
-/// Clamped bodies get the lowest modes that are left out: so many of each kind that they have, half as many of others,
-/// for what bends out of the hinge plane is left out, too. Some stretch and some twist; static shapes of loads at the
-/// free end stand for them where no mode among many does.
+/// Clamped bodies get the lowest modes that are left out. They get the given number (ModesBeyond) of each kind that
+/// they have. They get half as many of other kinds, for what bends out of the hinge plane is left out, too. Some of
+/// these stretch and some twist. Static shapes of loads at the free end stand for them where no mode among many does.
 /// Other bases get so many in each plane. Bodies from files get the modes that their files have beyond those kept.
 /// @throws InputError, NumericalError as prepare_body.
 Scene with_more_modes(Scene, const ModesBeyond&, const RunHooks&);

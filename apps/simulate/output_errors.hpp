@@ -48,8 +48,8 @@ struct OutputDifference {
   double size = 0;   // the largest value of the output over time [its unit]
 };
 
-/// Over the outputs that both tables have and that are wanted (all but lvlh when `wanted` is empty): the largest
-/// |a - b| over time, by the largest |b| over time.
+/// The largest |a - b| over time, by the largest |b| over time. The outputs compared are those that both tables have
+/// and that are wanted. When `wanted` is empty, they are all but lvlh.
 ///
 /// With floors that size is no less than an absolute error, or round-off, divided by the tolerance. Round-off is 1e-14
 /// of the largest of these:

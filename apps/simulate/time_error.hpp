@@ -19,10 +19,10 @@ struct Settling {
   double balance = std::numeric_limits<double>::infinity();  // the largest energy balance
 };
 
-/// Repeats a run ten times tighter until its outputs change no more than is bearable, and its energies balance: steps
+/// Repeats a run ten times tighter until its outputs change no more than is bearable, and its energies balance. Steps
 /// that are right for the outputs may leave powers out. `run` is then the last but one. `flown` has the tolerance of
 /// its integrator, and `plan` says so. Returns the last differences. `reference`: a run of the same model that is more
-/// precise, which takes the place of the tighter ones, and `run` is the last.
+/// precise. It takes the place of the tighter ones, and `run` is the last.
 /// @throws InputError, NumericalError as run_scene.
 std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors&, Settling, const RunHooks&,
                                                 std::vector<std::string>& plan, const Run* reference = nullptr);

@@ -118,8 +118,8 @@ ReactionWheel wheel_of(const Scene& scene, const WheelScene& w) {
   return wheel;
 }
 
-/// Inertia of all bodies about their mass centre at the start, axes of `body`, less what the rotors have about their
-/// own axes [kg m^2]: the angular momentum of unit rates.
+/// Inertia of all bodies about their mass centre at the start, axes of `body` [kg m^2]. It is the angular momentum of
+/// unit rates, less what the rotors have about their own axes.
 Matrix3d inertia_at_start(const Scene& scene, const Tree& tree, int body) {
   TreeState s = start_state(scene, tree);
   Place place;

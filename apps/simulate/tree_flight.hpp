@@ -43,9 +43,9 @@ bool will_be_revised(const Scene&, const Multibody&, const std::vector<LargestSt
 void fly_until_settled(const Scene&, const Multibody&, std::vector<LargestStiffening>& effect, std::vector<Stiffening>&,
                        const std::function<bool()>& fly);
 
-/// One flight in relative coordinates. Geometric stiffness "auto" is on
-/// where it exceeds the tolerance at the start, under the prescribed motions, or (then the flight is repeated with it)
-/// at any output. `max_steps` > 0 bounds its cost. @throws InputError, NumericalError.
+/// One flight in relative coordinates. Geometric stiffness "auto" is on where it exceeds the tolerance at the start or
+/// under the prescribed motions. Where it exceeds the tolerance at any output, the flight is repeated with it.
+/// `max_steps` > 0 bounds its cost. @throws InputError, NumericalError.
 Run fly_tree(const Scene&, std::vector<PreparedBody>, const RunHooks&, long max_steps);
 
 /// Adds where the scene's functions of time are not smooth, and where steps must end so that they overlook nothing of

@@ -23,8 +23,8 @@ Scene as_flown(Scene, const Run&);
 Scene with_stiffening(Scene);
 
 /// The same model in relative coordinates, by the method that the program picks, a digit tighter than what is asked
-/// for: what bodies leave out shows there as well, at a part of the cost. By multipliers, or by a method that stiff
-/// modes hold up, a flight with more of them takes minutes. Nothing: the scene is flown like that, or has loops.
+/// for. What bodies leave out shows there as well, at a part of the cost. By multipliers, or by a method that stiff
+/// modes hold up, a flight with more modes takes minutes. Nothing: the scene is flown like that, or has loops.
 std::optional<Scene> by_cheapest_means(Scene);
 
 }  // namespace flexboom

@@ -19,8 +19,8 @@ Eigen::Vector3d gravity(const Planet&, const Eigen::Vector3d& r);
 /// The part of it that J2 makes.
 Eigen::Vector3d oblateness_gravity(const Planet&, const Eigen::Vector3d& r);
 
-/// gravity(R + rho) - gravity(R), good to round-off of itself at any rho: no large numbers are subtracted (Battin,
-/// An Introduction to the Mathematics and Methods of Astrodynamics, 1999, eq. 8.62: Encke's method).
+/// gravity(R + rho) - gravity(R), good to round-off of itself at any rho: no large numbers are subtracted.
+/// Encke's method: Battin, An Introduction to the Mathematics and Methods of Astrodynamics, 1999, eq. 8.62.
 Eigen::Vector3d differential_gravity(const Planet&, const Eigen::Vector3d& R, const Eigen::Vector3d& rho);
 
 /// d(gravity)/dr at r: symmetric, trace zero [1/s^2]. A point mass: mu/r^3 (3 c c^T - I), c = r/|r|.

@@ -109,8 +109,8 @@ bool Contacts::slipped_through(std::size_t i, Gap gap, double noise) const {
   return closed_[i] ? gap.value < -noise : gap.value > noise;
 }
 
-/// Size of motions about the stop that are not followed: those the scene does not ask for, and those that are hardly
-/// more than noise, whose crossings would be as dense as the steps.
+/// Size of motions about the stop that are not followed. They are those that the scene does not ask for, and those that
+/// are hardly more than noise. Crossings of the latter would be as dense as the steps.
 double Contacts::small(std::size_t i, const StopMotion& motion) const {
   return std::max(settle_ * history_[stops_[i].joint].largest_rate * stops_[i].period, motion.noise(i));
 }

@@ -72,8 +72,9 @@ class Contacts {
   /// `joints`: number of histories.
   Contacts(std::vector<Stop>, const FlightOptions&, std::size_t joints);
 
-  /// Closed as a flight that this one goes on left it; else beyond the stop, exactly on it by where the joint goes, and
-  /// at rest there by where it is pushed. Those that had settled are as good as open.
+  /// A stop is closed as a flight that this one goes on left it. Without such a flight, it is closed where the joint is
+  /// beyond the stop. Exactly on the stop, it is decided by where the joint goes. At rest there, it is decided by where
+  /// the joint is pushed. Stops that had settled are as good as open.
   void begin(StopMotion&);
 
   /// Applies the crossings that a step ended at, and what settles or wakes.

@@ -115,7 +115,8 @@ class Flight : protected StopMotion, protected LawMotion {
   }
 
   /// Outputs up to t_: those within the step as many at a time as go at once. False where the flight is stopped before
-  /// the last of them: it is then where the last row is, or where the step came `from`, and next_y_ was its state.
+  /// the last of them. The flight is then where the last row is, or where the step came `from`. next_y_ was its state
+  /// there.
   bool write_outputs(double from) {
     constexpr std::size_t at_once = 16;
     samples_.resize(y_.size(), at_once);

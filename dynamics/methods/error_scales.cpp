@@ -113,7 +113,7 @@ void ErrorScales::for_each_size(const VectorXd& y, const Each& each) const {
     const TreeLayout::Joint& j = l.joints[i];
     for (int k = 0; k < joint_type(tree_.scene().joints[i].kind).scalars; ++k) {
       const int at = j.scalar + k, rate = l.rate(at);
-      // Gap and rate measure each other: at the stop the gap is zero but the motion is not, where the spring turns back
+      // Gap and rate measure each other. At the stop the gap is zero but the motion is not. Where the spring turns back
       // it is the other way round. What a spring presses into its stop at rest does not move: no stop in the rate.
       each(at, std::max(std::abs(y[at]), std::abs(y[rate]) * period_[i]));
       each(rate, std::max(std::abs(y[rate]), std::abs(y[at]) * spring_rate_[i]));
@@ -146,9 +146,10 @@ void ErrorScales::for_each_size(const VectorXd& y, const Each& each) const {
   for (int i = l.dissipated; i < l.size; ++i) each(i, std::abs(y[i]));
 }
 
-/// A small part of the body's size (lengths, deflections), of a radian, and of these in the time that they take; or of
-/// the values that all the energy at the start could give each state, where that is less. Without energy at the start,
-/// elastic coordinates begin with a thousandth of that: a stiff one of the same size has far more energy than others.
+/// A floor is a small part of the body's size (lengths, deflections), of a radian, or of these in the time that they
+/// take. It is the value that all the energy at the start could give the state, where that is less. Without energy at
+/// the start, elastic coordinates begin with a thousandth of the floor. A stiff one of the same size has far more
+/// energy than others.
 void ErrorScales::set_floors(const VectorXd& y0) {
   constexpr double of_size = 1e-5, at_first = 1e-3;
   const TreeLayout& l = tree_.layout();

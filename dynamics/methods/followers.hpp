@@ -47,8 +47,8 @@ class Followers {
   double error(const CollocatedStep&, const Eigen::Ref<const Eigen::VectorXd>& z_error, double left) const;
 
   /// What only the outside could change is as it was at the start: angular momentum. A wrong attitude is turned, a
-  /// wrong rate is made faster or slower, each by its size; where there is a momentum, mostly the attitude, for that
-  /// acts back on nothing. Returns what it added to omega of the first root [rad/s].
+  /// wrong rate is made faster or slower, each by its size. Where there is a momentum, it is mostly the attitude that
+  /// is turned, for that acts back on nothing. Returns what it added to omega of the first root [rad/s].
   Eigen::Vector3d keep_momentum(double t, Eigen::VectorXd& y);
 
  private:

@@ -16,8 +16,8 @@ namespace flexboom {
 /// at this angular frequency [rad/s]; the remainder takes the difference.
 inline constexpr double held = 1e-3;
 
-/// The linear parts L of x' = L x + N of a flight: one for each set of closed stops, taken at rest near where the
-/// joints are, and kept until `renew` puts another in its place.
+/// The linear parts L of x' = L x + N of a flight. There is one for each set of closed stops, taken at rest near where
+/// the joints are. It is kept until `renew` puts another in its place.
 class LinearParts {
  public:
   explicit LinearParts(SplitProblem&);

@@ -22,9 +22,10 @@ double StopSearch::first_crossing(const CollocatedStep& step, std::span<const ch
 
 namespace {
 
-/// What each of m modes has of an entry of x, beyond where the remainder n holds it: the real part of
-/// f (lambda z + n) / lambda, where f are its eigenvectors there, with the sign of the imaginary parts turned. Parts in
-/// halves of m. `rate`: the square of the same times lambda. Of lambda = 0 the share is none.
+/// What each of m modes has of an entry of x, beyond where the remainder n holds it. This share is the real part of
+/// f (lambda z + n) / lambda. Here f are the eigenvectors at the entry, with the sign of the imaginary parts turned.
+/// Real and imaginary parts are halves of 2 m entries. `rate`: the square of the share's size times |lambda|^2. Where
+/// lambda = 0 the share is zero.
 FLEXBOOM_FOR_EACH_PROCESSOR
 void shares_of(Index m, const double* lambda_re, const double* lambda_im, const double* f, const double* z,
                const double* n, double* share, double* rate) {

@@ -26,7 +26,7 @@ class StopSearch {
  public:
   explicit StopSearch(std::vector<SplitLayout::Coordinate> gaps) : gaps_(std::move(gaps)) {}
 
-  /// The fraction at which the step ends: of the first gap that crosses its level, or 1; infinite levels are never
+  /// The fraction at which the step ends: that of the first gap that crosses its level, or 1. Infinite levels are never
   /// crossed. crossed[i]: +1 where the gap of hinge i rises there, -1 where it falls.
   double first_crossing(const CollocatedStep&, std::span<const char> contact, std::span<const double> levels,
                         std::span<int> crossed);

@@ -7,8 +7,9 @@
 
 namespace flexboom {
 
-/// Hinge between a hub and a boom. At angle Theta the boom's x axis is cos(Theta) stowed + sin(Theta) outward, its y
-/// axis the derivative of that (positive deflection), its z axis the hinge axis; the boom's BRF origin is at `point`.
+/// Hinge between a hub and a boom. At angle Theta the boom's x axis is cos(Theta) stowed + sin(Theta) outward. Its y
+/// axis is the derivative of that by Theta (positive deflection). Its z axis is the hinge axis. The boom's BRF origin
+/// is at `point`.
 struct Hinge {
   std::string name{};                                  // empty: that of the boom
   Eigen::Vector3d point = Eigen::Vector3d::Zero();     // on the hub, hub BRF [m]

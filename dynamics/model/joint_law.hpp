@@ -69,7 +69,7 @@ inline constexpr std::array<std::string_view, 4> law_motions = {"free", "forward
 
 /// A law in one discrete state, x the angle less the threshold of the mechanism:
 ///     load = (spring - stiffness x) + (drag - damping rate) + friction - stop_damping rate - (unused - unused_slope x)
-/// `unused` is what a pad that is left too fast does not give back: with it the stored energy goes by x alone.
+/// `unused` is what a pad that is left too fast does not give back. With it the stored energy goes by x alone.
 struct LawBranch {
   bool held = false;  // the joint does not move
   double spring = 0, stiffness = 0, drag = 0, damping = 0, friction = 0, stop_damping = 0, unused = 0, unused_slope = 0;

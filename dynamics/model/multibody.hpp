@@ -18,8 +18,9 @@ namespace flexboom {
 /// Is the geometric stiffness of a body in the equations? `stiffening_effect` tells its size.
 enum class Stiffening { off, on };
 
-/// A place on a body where something is joined, pushed or measured. With a marker, it moves by S q and turns by the
-/// rotation vector S_theta q (exponential map, BRF axes) with the flexible body; without one it is fixed in the BRF.
+/// A place on a body where something is joined, pushed or measured. With a marker, it moves by S q with the flexible
+/// body. It then turns by the rotation vector S_theta q (exponential map, BRF axes). Without a marker, it is fixed in
+/// the BRF.
 struct Place {
   int body = -1;                                       // index into Multibody::bodies; -1: the inertial frame
   std::string marker;                                  // name of a marker of the body; empty: `position`
@@ -64,7 +65,7 @@ struct Load {
   std::array<std::function<double(double)>, 3> force, torque;  // [N], [N m]; empty functions are zero
 };
 
-/// A rotor whose mass and transverse inertia are already the body's; only its spin is its own:
+/// A rotor whose mass and transverse inertia are already the body's. Only its spin is its own:
 /// inertia (spin_dot + axis . alpha) = torque, reaction -torque on the body.
 struct ReactionWheel {
   std::string name;

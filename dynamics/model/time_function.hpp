@@ -21,8 +21,9 @@ struct TimeCourse {
 /// @throws InputError with the column and the nearest known name.
 TimeCourse time_expression(const std::string& text);
 
-/// Values at given times. "cubic": spline with continuous acceleration, third derivative continuous at the second and
-/// the last but one point (not-a-knot: error of fourth order up to the ends); "linear": its acceleration is zero.
+/// Values at given times. "cubic": spline with continuous acceleration. Its third derivative is continuous at the
+/// second and the last but one point (not-a-knot: error of fourth order up to the ends). "linear": its acceleration is
+/// zero.
 struct TimeTable {
   std::vector<double> time;   // ascending [s]
   std::vector<double> value;  // one per time
@@ -48,10 +49,10 @@ struct Manoeuvre {
 /// @throws InputError for an unknown profile or limits that are not positive.
 TimeCourse rest_to_rest(const Manoeuvre&);
 
-/// Ends of pieces of [0, duration], ascending [s]: on each piece a polynomial of degree 4 follows every function, to a
-/// thousandth of its range there or `negligible` of its largest size. Seen at `samples` times (a power of 2, 4 at
-/// least) at equal distances; no piece is shorter than four of these. What looks at five points of a piece or more sees
-/// all that these functions do.
+/// Ends of pieces of [0, duration], ascending [s]. On each piece a polynomial of degree 4 follows every function. It
+/// does so to a thousandth of the function's range there or `negligible` of its largest size. The functions are seen at
+/// `samples` times (a power of 2, 4 at least) at equal distances; no piece is shorter than four of these. What looks at
+/// five points of a piece or more sees all that these functions do.
 std::vector<double> smooth_pieces(const std::vector<std::function<double(double)>>&, double duration, int samples,
                                   double negligible);
 

@@ -9,8 +9,8 @@
 
 namespace flexboom {
 
-/// Distance of a hinge from its stop on the side where its flag says that it is (negative: it has crossed), at the
-/// share c of a step, and its slope there, over that share.
+/// Distance of a hinge from its stop at the share c of a step, and the slope of the distance by c. It is counted on the
+/// side where the hinge's flag says that it is (negative: it has crossed).
 struct Clearance {
   double c = 0, value = 0, slope = 0;
 };
@@ -66,8 +66,9 @@ double crossing_in_bracket(const At& at, const Clearance& from, const Clearance&
   return newton_in_bracket(at, from.c, to.c, guess, resolution);
 }
 
-/// Whether it may cross between two places so near that it has at most one dip between them: it has at the second, or
-/// the cubic has a dip that is worth following to its bottom.
+/// Whether the hinge may cross between two places so near that the clearance has at most one dip between them. It may
+/// where it has crossed at the second place. It also may where the cubic has a dip that is worth following to its
+/// bottom.
 inline bool may_cross(const Clearance& from, const Clearance& to) {
   if (to.value < 0) return true;
   if (!(from.slope < 0 && to.slope > 0)) return false;

@@ -6,8 +6,8 @@ namespace flexboom {
 
 /// A number with N directional derivatives (forward-mode differentiation): f(Dual) carries f and df exactly, without
 /// differences. The equations of motion are written once for a scalar T; T = double gives their value, T = Dual<N> N
-/// columns of their Jacobian. N is a power of two: the derivatives are one vector of the compiler, so that an operation
-/// on all of them is one instruction where the machine has registers that wide.
+/// columns of their Jacobian. N is a power of two: the derivatives are one vector of the compiler. So an operation on
+/// all of them is one instruction where the machine has registers that wide.
 template <int N>
 struct Dual {
   // Aligned as any processor's memory is, whichever one a function is compiled for.

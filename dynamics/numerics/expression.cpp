@@ -14,9 +14,9 @@
 #include <string_view>
 #include <utility>
 
-// muParser (the only door to it) reads the text. It computes in double and differentiates by differences, which loses
-// half of the digits; so its operators here do not compute but write down what they are asked for, and the list is
-// evaluated with derivatives.
+// muParser reads the text, and this file is its only wrapper. It computes in double and differentiates by differences,
+// which loses half of the digits. So its operators here do not compute but write down what they are asked for. The list
+// is evaluated with derivatives.
 
 namespace flexboom {
 namespace {

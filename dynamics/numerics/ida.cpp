@@ -103,8 +103,8 @@ struct Ida::Impl {
     return guarded(user, [&](Impl& self) { self.problem.root_values(t, N_VGetArrayPointer(y), values); });
   }
 
-  /// Constraints hold to what Newton's method leaves, so it must not stop after one correction because earlier steps
-  /// converged well (IDA's own test does), and it must stop where corrections are round-off.
+  /// Constraints hold to what Newton's method leaves. So it must not stop after one correction because earlier steps
+  /// converged well, as IDA's own test does. It must also stop where corrections are round-off.
   static int converged(SUNNonlinearSolver solver, N_Vector, N_Vector correction, realtype, N_Vector weights,
                        void* user) noexcept {
     constexpr double left = 1e-4, negligible = 1e-5, small = 3e-3, round_off = 0.3;  // of the error allowed per step

@@ -7,9 +7,9 @@
 
 namespace flexboom {
 
-/// I - gamma J of y' = f(y), in a smaller form. Two kinds of unknowns are taken out: coordinates, whose row of J has
-/// the one entry 1 of their rate, and what nothing depends on (energies, places without a field): its column of J is
-/// zero.
+/// I - gamma J of y' = f(y), in a smaller form. Two kinds of unknowns are taken out. The first are coordinates, whose
+/// row of J has the one entry 1 of their rate. The second is what nothing depends on (energies, places without a
+/// field): its column of J is zero.
 class NewtonMatrix {
  public:
   Eigen::MatrixXd J;

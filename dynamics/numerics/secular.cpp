@@ -68,8 +68,8 @@ Complex repulsion(const Numbers& lambda, const Numbers& delta, Index j) {
   return {re, im};
 }
 
-/// Poles lambda_i and the roots of 1 + sum p_i / (lambda_i - mu), each kept as its distance from the pole that it came
-/// from: near that, it has the digits. Both come with their conjugates.
+/// Poles lambda_i and the roots of 1 + sum p_i / (lambda_i - mu). Each root is kept as its distance from the pole that
+/// it came from: near that, it has the digits. Both come with their conjugates.
 class Secular {
  public:
   /// Of each pair one; p alike.

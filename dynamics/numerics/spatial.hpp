@@ -94,6 +94,13 @@ auto transposed_product(const Mat3<S>& a, const Vec3<T>& b) {
                                           a.row[0].z * b.x + a.row[1].z * b.y + a.row[2].z * b.z};
 }
 
+/// Its rows are the columns of `a`.
+template <class T>
+Mat3<T> transposed(const Mat3<T>& a) {
+  const Vec3<T>&x = a.row[0], &y = a.row[1], &z = a.row[2];
+  return {{Vec3<T>{x.x, y.x, z.x}, Vec3<T>{x.y, y.y, z.y}, Vec3<T>{x.z, y.z, z.z}}};
+}
+
 /// Component of a vector, or of a symmetric matrix in the order of its members, by number.
 template <class T, std::integral I>
 T& component(Vec3<T>& a, I i) {

@@ -225,16 +225,15 @@ void Equations::residual(double t, const double* y, const double* y_dot, const J
     if (j.rows.empty() && !j.mechanism) continue;
     const Joint& joint = scene_.joints[i];
     const PairMotion<double> x = pair(j, t, y, &joint);
-    const PlaceMotion<double> a = place_motion(j.a, x.frame_a, x.elastic_a),
-                              b = place_motion(j.b, x.frame_b, x.elastic_b);
+    const JoinedPlaces<double> at(j, x);
     PairForces<double> forces, correction;
     std::array<double, 6> g{}, g_dot{};
-    constrain(j, x, a, b, multipliers(j, y), g.data(), g_dot.data(), forces, &correction, power);
+    constrain(at, multipliers(j, y), g.data(), g_dot.data(), forces, &correction, power);
     if (j.mechanism) {
       const MechanismState state = memory.of(i);
       double in_joint = 0;
       const DriveMotion<double> c =
-          act_mechanism(j, joint.mechanism, joint.kind == JointKind::hinge, state, x, a, b, forces, in_joint);
+          act_mechanism(at, joint.mechanism, joint.kind == JointKind::hinge, state, forces, in_joint);
       F[losses(i)] = y_dot[losses(i)] - in_joint;
       for (int k = 0; j.law && k < static_cast<int>(law_losses.size()); ++k)
         F[losses(i) + 1 + k] = y_dot[losses(i) + 1 + k] - state.law.power(static_cast<LawLoss>(k), c.value, c.rate);
@@ -250,8 +249,7 @@ void Equations::residual(double t, const double* y, const double* y_dot, const J
     const JointData& j = prepared_.springs[i];
     const PairMotion<double> x = pair(j, t, y, nullptr);
     PairForces<double> forces;
-    act_spring(j, scene_.springs[i], x, place_motion(j.a, x.frame_a, x.elastic_a),
-               place_motion(j.b, x.frame_b, x.elastic_b), forces, loss);
+    act_spring(JoinedPlaces<double>(j, x), scene_.springs[i], forces, loss);
     scatter(j.a, forces.a, y, F);
     scatter(j.b, forces.b, y, F);
   }
@@ -291,8 +289,7 @@ void Equations::row_violations(double t, const double* y, double* g, double* g_d
     const PairMotion<double> x = pair(j, t, y, &scene_.joints[i]);
     PairForces<double> unused;
     double power = 0;
-    constrain(j, x, place_motion(j.a, x.frame_a, x.elastic_a), place_motion(j.b, x.frame_b, x.elastic_b),
-              RowMultipliers{}, g, g_dot, unused, nullptr, power);
+    constrain(JoinedPlaces<double>(j, x), RowMultipliers{}, g, g_dot, unused, nullptr, power);
     g += j.rows.size(), g_dot += j.rows.size();
   }
 }
@@ -301,7 +298,7 @@ DriveMotion<double> Equations::gap(size_t i, const double* y, double near) const
   const JointData& j = joints_[i];
   const PairMotion<double> x = pair(j, 0, y, nullptr);
   return joint_gap(scene_.joints[i].kind == JointKind::hinge, scene_.joints[i].mechanism.threshold,
-                   place_motion(j.a, x.frame_a, x.elastic_a), place_motion(j.b, x.frame_b, x.elastic_b), near);
+                   JoinedPlaces<double>(j, x), near);
 }
 
 std::vector<JointReaction> Equations::loads(double t, const double* y) {
@@ -309,18 +306,17 @@ std::vector<JointReaction> Equations::loads(double t, const double* y) {
   for (size_t i = 0; i < joints_.size(); ++i) {
     const JointData& j = joints_[i];
     const PairMotion<double> x = pair(j, t, y, &scene_.joints[i]);
-    const PlaceMotion<double> a = place_motion(j.a, x.frame_a, x.elastic_a),
-                              b = place_motion(j.b, x.frame_b, x.elastic_b);
+    const JoinedPlaces<double> at(j, x);
     Vec3<double> force, torque;
     for (const Row& row : j.rows) {
       if (!row.kept) continue;
-      const RowVectors<double> v = row_vectors(row, a, b, x.drive);
+      const RowVectors<double> v = row_vectors(row, at);
       if (row.kind == Row::Kind::along)
         force += y[row.lambda] * v.e;
       else
         torque += y[row.lambda] * cross(v.f, v.e);
     }
-    loads[i] = {eigen(transposed_product(a.axes, force)), eigen(transposed_product(a.axes, torque))};
+    loads[i] = {eigen(transposed_product(at.a.axes, force)), eigen(transposed_product(at.a.axes, torque))};
   }
   return loads;
 }
@@ -344,7 +340,8 @@ EnergyLedger Equations::ledger(const double* y, const JointMemory& memory) const
   for (size_t i = 0; i < scene_.springs.size(); ++i) {
     const JointData& j = prepared_.springs[i];
     const PairMotion<double> x = pair(j, 0, y, nullptr);
-    const Vec3<double> d = place_motion(j.b, x.frame_b, x.elastic_b).r - place_motion(j.a, x.frame_a, x.elastic_a).r;
+    const JoinedPlaces<double> at(j, x);
+    const Vec3<double> d = at.b.r - at.a.r;
     const double stretch = std::sqrt(dot(d, d)) - scene_.springs[i].free_length;
     e.springs += 0.5 * scene_.springs[i].stiffness * stretch * stretch;
   }

@@ -70,13 +70,28 @@ Vec3<T> lifted(const Vec3<double>& a) {
   return {T(a.x), T(a.y), T(a.z)};
 }
 
+/// The two places of a joint or a spring, and how they move.
 template <class T>
-RowVectors<T> row_vectors(const Row& row, const PlaceMotion<T>& a, const PlaceMotion<T>& b,
-                          const std::array<DriveMotion<T>, 2>& drive) {
+struct JoinedPlaces {
+  JoinedPlaces(const JointData& of, const PairMotion<T>& motion)
+      : joint(of),
+        x(motion),
+        a(place_motion(of.a, motion.frame_a, motion.elastic_a)),
+        b(place_motion(of.b, motion.frame_b, motion.elastic_b)) {}
+  JoinedPlaces(const JointData&, PairMotion<T>&&) = delete;  // it is kept by reference
+
+  const JointData& joint;
+  const PairMotion<T>& x;
+  PlaceMotion<T> a, b;
+};
+
+template <class T>
+RowVectors<T> row_vectors(const Row& row, const JoinedPlaces<T>& at) {
   using std::cos;
   using std::sin;
   RowVectors<T> r;
-  const DriveMotion<T>& d = drive[row.freedom];
+  const PlaceMotion<T>&a = at.a, &b = at.b;
+  const DriveMotion<T>& d = at.x.drive[row.freedom];
   Vec3<T> e = lifted<T>(row.e), f = lifted<T>(row.f), e_turn{}, f_turn{};
   if (row.drive == Row::Drive::turn_e) {
     const T c = cos(d.value), s = sin(d.value);
@@ -110,10 +125,9 @@ RowVectors<T> row_vectors(const Row& row, const PlaceMotion<T>& a, const PlaceMo
 
 /// Force at b's place and torque, inertial axes, on b and the opposite on a: the force acts at b's place on both.
 template <class T>
-void add_pair(const JointData& joint, const PairMotion<T>& x, const PlaceMotion<T>& a, const PlaceMotion<T>& b,
-              const Vec3<T>& force, const Vec3<T>& torque, PairForces<T>& out) {
-  add_force(joint.b, x.frame_b, b, force, torque, out.b);
-  add_force(joint.a, x.frame_a, a, -force, -(torque + cross(b.r - a.r, force)), out.a);
+void add_pair(const JoinedPlaces<T>& at, const Vec3<T>& force, const Vec3<T>& torque, PairForces<T>& out) {
+  add_force(at.joint.b, at.x.frame_b, at.b, force, torque, out.b);
+  add_force(at.joint.a, at.x.frame_a, at.a, -force, -(torque + cross(at.b.r - at.a.r, force)), out.a);
 }
 
 /// Multipliers of a joint's rows, zero of those left out: forces, and corrections of positions.
@@ -123,10 +137,10 @@ struct RowMultipliers {
 
 /// Values and rates of the rows; adds lambda times their gradient to `out`, mu times it to `correction`.
 template <class T>
-void constrain(const JointData& joint, const PairMotion<T>& x, const PlaceMotion<T>& a, const PlaceMotion<T>& b,
-               const RowMultipliers& of, T* g, T* g_dot, PairForces<T>& out,
+void constrain(const JoinedPlaces<T>& at, const RowMultipliers& of, T* g, T* g_dot, PairForces<T>& out,
                std::type_identity_t<PairForces<T>>* correction, T& power) {
-  const Vec3<T> d = b.r - a.r, d_dot = b.r_dot - a.r_dot;
+  const JointData& joint = at.joint;
+  const Vec3<T> d = at.b.r - at.a.r, d_dot = at.b.r_dot - at.a.r_dot;
   Vec3<T> force{}, torque{}, mu_force{}, mu_torque{};
   for (size_t i = 0; i < joint.rows.size(); ++i) {
     const Row& row = joint.rows[i];
@@ -134,7 +148,7 @@ void constrain(const JointData& joint, const PairMotion<T>& x, const PlaceMotion
       g[i] = g_dot[i] = T(0.0);
       continue;
     }
-    const RowVectors<T> v = row_vectors(row, a, b, x.drive);
+    const RowVectors<T> v = row_vectors(row, at);
     if (row.kind == Row::Kind::along) {
       g[i] = dot(v.e, d) - v.shift;
       g_dot[i] = dot(v.e_dot, d) + dot(v.e, d_dot) - v.shift_dot;
@@ -149,27 +163,24 @@ void constrain(const JointData& joint, const PairMotion<T>& x, const PlaceMotion
     }
     power += of.lambda[i] * v.power;
   }
-  add_pair(joint, x, a, b, force, torque, out);
-  if (correction != nullptr) add_pair(joint, x, a, b, mu_force, mu_torque, *correction);
+  add_pair(at, force, torque, out);
+  if (correction != nullptr) add_pair(at, mu_force, mu_torque, *correction);
 }
 
 /// Angle of b about +z of a [rad], or way along it [m], less `threshold`, and its rate; of angles the turn nearest to
 /// `near`. Near zero it keeps its digits.
 template <class T>
-DriveMotion<T> joint_gap(bool hinge, double threshold, const PlaceMotion<T>& a, const PlaceMotion<T>& b, double near) {
+DriveMotion<T> joint_gap(bool hinge, double threshold, const JoinedPlaces<T>& at, double near) {
   using std::atan2;
-  const auto column = [](const Mat3<T>& A, int j) {
-    return j == 0   ? Vec3<T>{A.row[0].x, A.row[1].x, A.row[2].x}
-           : j == 1 ? Vec3<T>{A.row[0].y, A.row[1].y, A.row[2].y}
-                    : Vec3<T>{A.row[0].z, A.row[1].z, A.row[2].z};
-  };
-  const Vec3<T> z = column(a.axes, 2);
+  const PlaceMotion<T>&a = at.a, &b = at.b;
+  const Mat3<T> axes = transposed(a.axes);
+  const Vec3<T>& z = axes.row[2];
   if (!hinge) {
     const Vec3<T> d = b.r - a.r;
     return {dot(z, d) - threshold, dot(z, b.r_dot - a.r_dot) + dot(cross(a.omega, z), d)};
   }
-  const Vec3<T> x = column(b.axes, 0);
-  const T s = dot(column(a.axes, 1), x), c = dot(column(a.axes, 0), x);
+  const Vec3<T> x = transposed(b.axes).row[0];
+  const T s = dot(axes.row[1], x), c = dot(axes.row[0], x);
   const double st = std::sin(threshold), ct = std::cos(threshold);
   T angle = atan2(ct * s - st * c, ct * c + st * s);
   constexpr double turn = 2 * std::numbers::pi;
@@ -187,12 +198,11 @@ struct MechanismState {
 
 /// Spring, damper and stop of a hinge or slider, or its law; adds what the damper takes. Returns the gap.
 template <class T>
-DriveMotion<T> act_mechanism(const JointData& joint, const HingeMechanism& m, bool hinge, const MechanismState& state,
-                             const PairMotion<T>& x, const PlaceMotion<T>& a, const PlaceMotion<T>& b,
-                             PairForces<T>& out, T& loss) {
-  const DriveMotion<T> c = joint_gap(hinge, m.threshold, a, b, state.near);
+DriveMotion<T> act_mechanism(const JoinedPlaces<T>& at, const HingeMechanism& m, bool hinge,
+                             const MechanismState& state, PairForces<T>& out, T& loss) {
+  const DriveMotion<T> c = joint_gap(hinge, m.threshold, at, state.near);
   T push;
-  if (joint.law) {
+  if (at.joint.law) {
     push = state.law.load(c.value, c.rate);
     loss += state.law.damper_power(c.rate);
   } else {
@@ -200,23 +210,22 @@ DriveMotion<T> act_mechanism(const JointData& joint, const HingeMechanism& m, bo
     if (state.contact) push -= m.stop_stiffness * c.value;
     loss += m.damping * (c.rate * c.rate);
   }
-  const Vec3<T> along = push * Vec3<T>{a.axes.row[0].z, a.axes.row[1].z, a.axes.row[2].z};
-  add_pair(joint, x, a, b, hinge ? Vec3<T>{} : along, hinge ? along : Vec3<T>{}, out);
+  const Vec3<T> along = push * transposed(at.a.axes).row[2];
+  add_pair(at, hinge ? Vec3<T>{} : along, hinge ? along : Vec3<T>{}, out);
   return c;
 }
 
 /// Spring and damper along the line between the places; adds what the damper takes.
 template <class T>
-void act_spring(const JointData& places, const SpringDamper& spring, const PairMotion<T>& x, const PlaceMotion<T>& a,
-                const PlaceMotion<T>& b, PairForces<T>& out, T& loss) {
+void act_spring(const JoinedPlaces<T>& at, const SpringDamper& spring, PairForces<T>& out, T& loss) {
   using std::sqrt;
-  const Vec3<T> d = b.r - a.r;
+  const Vec3<T> d = at.b.r - at.a.r;
   const T squared = dot(d, d);
   if (!(value(squared) > 0)) return;  // no direction
   const T length = sqrt(squared);
-  const T rate = dot(d, b.r_dot - a.r_dot) / length;
+  const T rate = dot(d, at.b.r_dot - at.a.r_dot) / length;
   const T pull = (spring.stiffness * (length - spring.free_length) + spring.damping * rate) / length;
-  add_pair(places, x, a, b, -(pull * d), Vec3<T>{}, out);
+  add_pair(at, -(pull * d), Vec3<T>{}, out);
   loss += spring.damping * (rate * rate);
 }
 

@@ -102,9 +102,10 @@ class Multipliers {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The bodies where the joints of the tree put them, q = 0: for each joint its freedoms (hinge: angle [rad]; slider:
-/// way [m]; universal: two angles [rad]; spherical: rotation vector [rad]; free: way, then rotation vector, both in the
-/// axes of a), and their rates. An empty list of a joint is zeros. Joints that close loops are not looked at.
+/// The bodies where the joints of the tree put them, q = 0. `coordinates` has the freedoms of each joint, `rates` their
+/// rates. A hinge has an angle [rad]. A slider has a way [m]. A universal joint has two angles [rad]. A spherical joint
+/// has a rotation vector [rad]. A free joint has a way, then a rotation vector, both in the axes of a. An empty list of
+/// a joint is zeros. Joints that close loops are not looked at.
 /// @throws InputError when the joints are no tree or a list has the wrong size.
 std::vector<BodyState> place_bodies(const Multibody&, const std::vector<std::vector<double>>& coordinates,
                                     const std::vector<std::vector<double>>& rates = {});

@@ -325,30 +325,25 @@ void Equations::newton(double t, double c, const double* y, const double* y_dot,
     const RowMultipliers of = multipliers(j, y);
     const bool damped = j.law || (j.mechanism && joint.mechanism.damping != 0);
     const MatrixXd L = pair_derivatives(j, pair(j, t, y, &joint), damped, [&](const PairMotion<Lanes>& x) {
-      const PlaceMotion<Lanes> a = place_motion(j.a, x.frame_a, x.elastic_a),
-                               b = place_motion(j.b, x.frame_b, x.elastic_b);
+      const JoinedPlaces<Lanes> at(j, x);
       PairResult r;
-      constrain(j, x, a, b, of, r.g.data(), r.g_dot.data(), r.forces, nullptr, r.power);
+      constrain(at, of, r.g.data(), r.g_dot.data(), r.forces, nullptr, r.power);
       if (j.mechanism)
-        act_mechanism(j, joint.mechanism, joint.kind == JointKind::hinge, memory.of(i), x, a, b, r.forces, r.loss);
+        act_mechanism(at, joint.mechanism, joint.kind == JointKind::hinge, memory.of(i), r.forces, r.loss);
       return r;
     });
     pair_newton(j, L, damped, j.mechanism ? losses(i) : dissipated(), y, out);
     const PairMotion<double> now = pair(j, t, y, &joint);
+    const JoinedPlaces<double> at(j, now);
     for (const Row& r : j.rows)
-      if (r.kept && !r.holds && r.drive != Row::Drive::none)
-        out.add(work_, r.lambda,
-                -row_vectors(r, place_motion(j.a, now.frame_a, now.elastic_a),
-                             place_motion(j.b, now.frame_b, now.elastic_b), now.drive)
-                     .power);
+      if (r.kept && !r.holds && r.drive != Row::Drive::none) out.add(work_, r.lambda, -row_vectors(r, at).power);
   }
   for (size_t i = 0; i < scene_.springs.size(); ++i) {
     const JointData& j = prepared_.springs[i];
     const bool damped = scene_.springs[i].damping != 0;
     const MatrixXd L = pair_derivatives(j, pair(j, t, y, nullptr), damped, [&](const PairMotion<Lanes>& x) {
       PairResult r;
-      act_spring(j, scene_.springs[i], x, place_motion(j.a, x.frame_a, x.elastic_a),
-                 place_motion(j.b, x.frame_b, x.elastic_b), r.forces, r.loss);
+      act_spring(JoinedPlaces<Lanes>(j, x), scene_.springs[i], r.forces, r.loss);
       return r;
     });
     pair_newton(j, L, damped, dissipated(), y, out);
@@ -382,8 +377,7 @@ MatrixXd Equations::gradient(double t, const double* y) {
     const MatrixXd L = pair_derivatives(j, pair(j, t, y, &scene_.joints[i]), false, [&](const PairMotion<Lanes>& x) {
       PairResult r;
       Lanes power;
-      constrain(j, x, place_motion(j.a, x.frame_a, x.elastic_a), place_motion(j.b, x.frame_b, x.elastic_b),
-                RowMultipliers{}, r.g.data(), r.g_dot.data(), r.forces, nullptr, power);
+      constrain(JoinedPlaces<Lanes>(j, x), RowMultipliers{}, r.g.data(), r.g_dot.data(), r.forces, nullptr, power);
       return r;
     });
     for (const bool b : {false, true}) {
@@ -427,8 +421,7 @@ void Equations::row_values(double t, const double* y, RowValues& out) {
     }
     PairResult r;
     Lanes power;
-    constrain(j, x, place_motion(j.a, x.frame_a, x.elastic_a), place_motion(j.b, x.frame_b, x.elastic_b),
-              RowMultipliers{}, r.g.data(), r.g_dot.data(), r.forces, nullptr, power);
+    constrain(JoinedPlaces<Lanes>(j, x), RowMultipliers{}, r.g.data(), r.g_dot.data(), r.forces, nullptr, power);
     for (size_t k = 0; k < j.rows.size(); ++k, ++row) {
       out.g[row] = r.g[k].v;
       out.g_dot[row] = r.g_dot[k].v;

@@ -14,8 +14,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// What a start says of the energies to come: its own; where it has none, what its pushes begin with; where nothing
-/// pushes yet but round-off, that of slow bodies. `time`: in which a push shows [s].
+/// What a start says of the energies to come. It is the energy of the start. Where there is none, it is what its pushes
+/// begin with. Where nothing pushes yet but round-off, it is that of slow bodies. `time`: in which a push shows [s].
 double energy_scale(const Equations& equations, double at_start, const VectorXd& y_dot, double time) {
   double inertia = 0;
   for (const ReducedBody& b : equations.scene().bodies) inertia += b.J0.trace();

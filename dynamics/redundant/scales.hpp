@@ -6,9 +6,10 @@
 
 namespace flexboom::redundant {
 
-/// Sizes that errors of the redundant unknowns are weighed against: the largest value so far of the group it belongs to
-/// (displacement from the start for R, half the angle turned for p), and at least a small part of what the energy or
-/// the accelerations at the start could make of it. Multipliers are not weighed.
+/// Sizes that errors of the redundant unknowns are weighed against. A size is the largest value so far of the group
+/// that the unknown belongs to. It is the displacement from the start for R, half the angle turned for p. It is at
+/// least a small part of what the energy or the accelerations at the start could make of the unknown. Multipliers are
+/// not weighed.
 class StateScales {
  public:
   StateScales(Equations&, const Eigen::VectorXd& y0, const Eigen::VectorXd& y0_dot, double energy, double tolerance,

@@ -175,22 +175,17 @@ void check_branches(Equations& e, double t, const double* y) {
     const JointData& j = e.joints()[i];
     const Joint& joint = e.scene().joints[i];
     const PairMotion<double> x = e.pair(j, t, y, &joint);
-    const PlaceMotion<double> pa = place_motion(j.a, x.frame_a, x.elastic_a),
-                              pb = place_motion(j.b, x.frame_b, x.elastic_b);
-    const auto axis = [](const PlaceMotion<double>& p, int k) {
-      const Vec3<double>&r0 = p.axes.row[0], &r1 = p.axes.row[1], &r2 = p.axes.row[2];
-      return k == 0 ? Vec3<double>{r0.x, r1.x, r2.x} : Vec3<double>{r0.z, r1.z, r2.z};
-    };
+    const JoinedPlaces<double> at(j, x);
     const bool parallel =
         joint.kind == JointKind::hinge || joint.kind == JointKind::slider || joint.kind == JointKind::fixed;
     if (parallel)
-      require(dot(axis(pa, 2), axis(pb, 2)) > 0,
+      require(dot(transposed(at.a.axes).row[2], transposed(at.b.axes).row[2]) > 0,
               fmt::format("joint \"{}\": the z axes of its places are opposite, they must agree", joint.name));
     double turn = 0;
     if (joint.kind == JointKind::hinge && !joint.prescribed.empty()) turn = x.drive[0].value;
     if (joint.kind == JointKind::slider || joint.kind == JointKind::fixed ||
         (joint.kind == JointKind::hinge && !joint.prescribed.empty())) {
-      const double angle = joint_gap(true, turn, pa, pb, 0).value + turn;
+      const double angle = joint_gap(true, turn, at, 0).value + turn;
       require(std::abs(angle - turn) < 1,
               fmt::format("joint \"{}\": b is turned by {:.3g} rad about z against a, must be {:.3g}", joint.name,
                           angle, turn));

@@ -16,8 +16,8 @@ struct RowName {
 std::vector<RowName> row_names(const Equations&);
 std::string describe(const Equations&, RowName);  // joint "a": tilt about x
 
-/// The rank of the gradient of all rows, scaled by the inverse metric and to rows of length 1, by QR with column
-/// pivoting: which rows span it, how near they are to dependence.
+/// The rank of the gradient of all rows, scaled by the inverse metric and to rows of length 1. It is found by QR with
+/// column pivoting. The report says which rows span the gradient, and how near they are to dependence.
 struct RankReport {
   std::vector<char> kept;  // per row
   std::vector<RowName> left_out;

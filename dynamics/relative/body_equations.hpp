@@ -96,8 +96,8 @@ struct BodyScratch {
   explicit BodyScratch(size_t n = 0, size_t rows = 0) : Cr(n), Gw(n), b(n), g(n), J2_q(rows) {}
 };
 
-/// Mass matrix (symmetric, in blocks of translation and rotation) and force of a body with everything condensed to it
-/// that hangs on it, axes of the body.
+/// Mass matrix (symmetric, in blocks of translation and rotation) and force of a body, axes of the body. Everything
+/// that hangs on the body is condensed to it.
 template <class T>
 struct ArticulatedInertia {
   Sym3<T> tt, ww;

@@ -57,8 +57,8 @@ struct Link {
   Mat3<double> brf_axes;
 };
 
-/// Two to four bodies that hang on one parent by joints of one kind, hinges or fixed ones, carry nothing, and have
-/// equally many modes: computed side by side.
+/// Two to four bodies that are computed side by side. They hang on one parent by joints of one kind, hinges or fixed
+/// ones. They carry nothing, and have equally many modes.
 struct Leaves {
   equations::BodyOf<Quad> body;
   JointKind kind = JointKind::hinge;

@@ -66,9 +66,7 @@ void condense_held(const Link& link, LinkScratch<T>& s) {
   }
   for (size_t i = 0; i < n; ++i)  // L D -> L
     for (size_t j = 0; j < i; ++j) s.M[i * n + j] = s.M[i * n + j] * s.M[j * n + j];
-  const Mat3<T>& E = s.b.turn;
-  const Mat3<T> back = {{Vec3<T>{E.row[0].x, E.row[1].x, E.row[2].x}, Vec3<T>{E.row[0].y, E.row[1].y, E.row[2].y},
-                         Vec3<T>{E.row[0].z, E.row[1].z, E.row[2].z}}};
+  const Mat3<T> back = transposed(s.b.turn);
   I = shifted(back, -(back * r), I);
 }
 
@@ -114,11 +112,11 @@ Twist<T> motion_column(Freedom freedom, const Vec3<T>& turn_z_of_a, const Articu
     case Freedom::z:
       return {{I.tt.zx, I.tt.yz, I.tt.zz}, c.row[2]};
     case Freedom::turn_x:
-      return {{c.row[0].x, c.row[1].x, c.row[2].x}, {I.ww.xx, I.ww.xy, I.ww.zx}};
+      return {transposed(c).row[0], {I.ww.xx, I.ww.xy, I.ww.zx}};
     case Freedom::turn_y:
-      return {{c.row[0].y, c.row[1].y, c.row[2].y}, {I.ww.xy, I.ww.yy, I.ww.yz}};
+      return {transposed(c).row[1], {I.ww.xy, I.ww.yy, I.ww.yz}};
     case Freedom::turn_z:
-      return {{c.row[0].z, c.row[1].z, c.row[2].z}, {I.ww.zx, I.ww.yz, I.ww.zz}};
+      return {transposed(c).row[2], {I.ww.zx, I.ww.yz, I.ww.zz}};
     default:
       return {c * turn_z_of_a, I.ww * turn_z_of_a};
   }

@@ -275,8 +275,9 @@ std::array<T, 6> entries(const Twist<T>& a) {
 }
 
 /// Children that hang on moving places of a body whose modes are already eliminated. Place and child exchange the force
-/// F = W' (X A + h) - f', A the acceleration of the body, X A + h that of the place without F, and W' = (1 + W G)^-1 W
-/// the child's inertia W behind the compliance G of the modes: sums of positive terms, however heavy the child.
+/// F = W' (X A + h) - f'. A is the acceleration of the body, X A + h that of the place without F. W' = (1 + W G)^-1 W
+/// is the child's inertia W behind the compliance G of the modes. These are sums of positive terms, however heavy the
+/// child.
 template <class T, class C>
 void add_hung_children(const Link& link, const InverseOfMe<C>& inverse, const std::vector<Vec3<C>>& Gt,
                        LinkScratch<T>& s) {

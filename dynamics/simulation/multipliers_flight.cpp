@@ -2,6 +2,7 @@
 #include "dynamics/numerics/crossing.hpp"
 #include "dynamics/numerics/ida.hpp"
 #include "dynamics/redundant/balance.hpp"
+#include "dynamics/redundant/constraint_watch.hpp"
 #include "dynamics/redundant/frame.hpp"
 #include "dynamics/redundant/multipliers.hpp"
 #include "dynamics/redundant/scales.hpp"
@@ -191,7 +192,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   void choose_rows() {
     const VectorXd motion = y_.head(equations_.motion()), energies = y_.tail(equations_.energies());
     const RankReport rank = constraint_rank(equations_, t_, y_.data());
-    margin_ = rank.margin;
+    watch_.follow(rank);
     equations_.keep_rows(rank.kept);
     y_ = VectorXd::Zero(equations_.size());
     y_.head(motion.size()) = motion, y_.tail(energies.size()) = energies;
@@ -242,7 +243,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     check_branches(equations_, t_, y_.data());
     const RankReport rank = constraint_rank(equations_, t_, y_.data());
     for (const RowName& n : rank.left_out) result_.summary.redundant.push_back(describe(equations_, n));
-    margin_ = rank.margin;
+    watch_.follow(rank);
     equations_.keep_rows(rank.kept);
     y_ = equations_.pack(start);
     y_[equations_.dissipated()] = options_.dissipated, y_[equations_.work()] = options_.work;
@@ -253,7 +254,6 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     equations_.row_values(t_, y_.data(), values);
     require_closed(violation(equations_, values.g_dot), "m/s", "rad/s",
                    "can not follow: its motion is prescribed against other joints', by");
-    rows_ = rates_ = VectorXd::Zero(equations_.all_rows());
   }
 
   void require_closed(const Violation& v, const char* metres, const char* radians, const char* what) const {
@@ -311,7 +311,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       ida_->step(limit, t, y, crossed_);
       std::copy_n(crossed_.begin(), crossed.size(), crossed.begin());
     } catch (const NumericalError& error) {
-      if (constraint_rank(equations_, t, y.data()).margin < 3e-2 * margin_) throw_locked(t, y);
+      watch_.require_independent(t, y, 3e-2);
       const std::string body = body_without_inertia(equations_, t, y.data());
       if (!body.empty()) throw NumericalError(fmt::format("t = {:.9g} s: {}", t, body));
       throw;
@@ -327,32 +327,8 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
       const int direction = crossed_[contacts_.size() + i], away = laws_.sides()[i] ? -1 : 1;
       laws_.crossed()[i] = laws_.armed()[i] && direction == away ? away : 0;
     }
-    watch_constraints(t, y);
-  }
-
-  [[noreturn]] void throw_locked(double t, const VectorXd& y) {
-    throw NumericalError(fmt::format("joint \"{}\" locks at t = {:.6g} s: the joints leave no consistent velocity",
-                                     locked_joint(equations_, t, y.data()), t));
-  }
-
-  /// Drift, rows that were left out, and whether the constraints are still independent.
-  void watch_constraints(double t, const VectorXd& y) {
-    equations_.row_violations(t, y.data(), rows_.data(), rates_.data());
-    const Violation g = violation(equations_, rows_), g_dot = violation(equations_, rates_);
-    MultipliersSummary& s = result_.summary;
-    s.position_drift = std::max(s.position_drift, g.position);
-    s.angle_drift = std::max(s.angle_drift, g.angle);
-    s.velocity_drift = std::max(s.velocity_drift, g_dot.position);
-    s.angular_velocity_drift = std::max(s.angular_velocity_drift, g_dot.angle);
-    for (const BodyPlaces& at : equations_.places())
-      s.quaternion_drift = std::max(s.quaternion_drift, std::abs(y.segment<4>(at.p).norm() - 1));
-    if (std::max(g.position, g.angle) > 1e-6 + options_.tolerance) {
-      const RowName worst = g.position > g.angle ? g.worst_position : g.worst_angle;
-      throw NumericalError(fmt::format(
-          "{}: violated by {:.3g} at t = {:.6g} s; it depended on other joints at the start and does so no more",
-          describe(equations_, worst), std::max(g.position, g.angle), t));
-    }
-    if (steps() % 16 == 0 && constraint_rank(equations_, t, y.data()).margin < 1e-7 * margin_) throw_locked(t, y);
+    watch_.note_drift(t, y, 1e-6 + options_.tolerance, result_.summary);
+    if (steps() % 16 == 0) watch_.require_independent(t, y, 1e-7);
   }
 
   Clearance clearance(size_t i, const VectorXd& y) {
@@ -390,7 +366,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
         return clear(c, sample_);
       };
       const double root = crossing_between(at, from, to, 4e-16 * t / length);
-      // At round-off of the gap it may be no crossing to those who look at the rate: then the step ends where it ended,
+      // At round-off of the gap it may be no crossing to those who look at the rate. Then the step ends where it ended,
       // for the next one starts there.
       if (root >= first || !(at(root).slope < 0)) continue;
       std::ranges::fill(crossed_, 0);
@@ -461,14 +437,14 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   Equations& equations_;
   const Multibody& scene_;
   const MultipliersOptions& options_;
-  double margin_ = 1;
+  ConstraintWatch watch_{equations_};
   JointMemory memory_;
   std::vector<double> levels_ = std::vector<double>(contacts_.size());  // of the stops' gaps, where a step ends
   std::vector<Clearance> before_;                                       // of the stops and switches, before the step
   std::vector<int> crossed_;                                            // the same
   bool renumbered_ = false;
   DaeCounts past_;
-  VectorXd y_dot_, sample_, rows_, rates_;
+  VectorXd y_dot_, sample_;
   VectorXd blow_, held_blow_;  // changes of the state and of multipliers per impulse
   redundant::PatternSum assembly_;
   std::unique_ptr<FlightFrame> frame_;

@@ -20,9 +20,9 @@ struct LargestStiffening {
 inline constexpr int looks_at_stiffening = 200;
 void observe(const std::vector<StiffeningEffect>&, double t, std::vector<LargestStiffening>&);
 
-/// What a geometric stiffness of this size (of StiffeningEffect) changes where it is left out for so long [s], relative
-/// to what the body does: its size; or more, for a mode that is stiffer by e runs ahead by e / 2 for each radian that
-/// it turns. Of the slowest mode; its damping leaves x exp(-zeta x) of x radians.
+/// The change where a geometric stiffness of this size (of StiffeningEffect) is left out for so long [s], relative to
+/// what the body does. It is the size, or more. A mode that is stiffer by e runs ahead by e / 2 for each radian that it
+/// turns. This is taken of the slowest mode; its damping leaves x exp(-zeta x) of x radians.
 double change_without_stiffening(const ReducedBody&, double size, double duration);
 
 /// Names each body whose geometric stiffness is off although it would change more than the tolerance, or takes all
@@ -52,8 +52,9 @@ using StiffeningLook = std::function<void(const std::vector<LargestStiffening>&)
 TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const IntegratorOptions&,
                          const Checkpoint<TreeTrajectory>& = {}, const StiffeningLook& = {});
 
-/// For each body: on where the geometric stiffness changes more than `tolerance` (`change_without_stiffening`), by what
-/// it is at the start or, at rest relative to them, under the prescribed motions until `duration` [s].
+/// For each body: on where the geometric stiffness changes more than `tolerance` (`change_without_stiffening`). The
+/// stiffness is looked at as it is at the start. It is also looked at under the prescribed motions until `duration`
+/// [s], at rest relative to them.
 std::vector<Stiffening> stiffening_where_it_counts(const Tree&, Eigen::VectorXd y0, double duration, double tolerance);
 
 }  // namespace flexboom

@@ -99,8 +99,8 @@ void finish(SparseMatrix& A, bool has_beams) {
   if (has_beams) A.prune([](Index, Index, double value) { return value != 0; });
 }
 
-// Freedoms that no mass can reach through K, connections and equations: a connected group without any mass has no
-// motion of its own and takes no part in that of others (torsion of a line mass).
+// Freedoms that no mass can reach through K, connections and equations. A connected group without any mass has no
+// motion of its own and takes no part in that of others. An example is the torsion of a line mass.
 std::vector<char> massless_groups(const Mesh& mesh, const DofMap& dofs, const SparseMatrix& K, const SparseMatrix& M) {
   std::vector<char> massless(static_cast<size_t>(K.cols()), 0);
   const VectorXd mass = M.diagonal();

@@ -50,8 +50,9 @@ class PatternMatrix {
   SparseMatrix matrix_;
 };
 
-/// Elements in groups whose members share no entity, so that a group can be added in parallel; in the same order for
-/// any number of threads, and for a thousand elements after the other, whose part of the matrices a cache holds.
+/// Elements in groups whose members share no entity, so that a group can be added in parallel. The groups and their
+/// order do not depend on the number of threads. Each group lies within about a thousand successive elements, whose
+/// part of the matrices a cache holds.
 std::vector<std::vector<int>> independent_groups(const Mesh&, const DofMap&);
 
 }  // namespace flexboom

@@ -47,8 +47,8 @@ struct Motions {
   Eigen::VectorXd unit;  // of each freedom in the scaled lengths
 };
 
-/// What constraints ask of rigid motions. Freedoms without strain move as well as they can for them: only what none of
-/// their motions reaches is left, the part of Q beyond the rank in a QR factorisation.
+/// What constraints ask of rigid motions. Freedoms without strain move as well as they can for them. Only what none of
+/// their motions reaches is left: the part of Q beyond the rank in a QR factorisation.
 void add_constraints(Gram& of_held, const std::vector<ConstraintRow>& rows, const Motions& motions,
                      const std::vector<char>& held) {
   std::vector<Vector6d> asked;

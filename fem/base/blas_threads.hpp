@@ -5,16 +5,16 @@
 namespace flexboom {
 
 /// Threads of the dense kernels under the sparse factorisation (OpenBLAS, where it is what is installed). No more than
-/// there are idle cores now: its threads wait by spinning, and on a busy machine two of them were seen ten times slower
-/// than one. Returns the number that was set.
+/// there are idle cores now, since its threads wait by spinning. On a busy machine two of them were seen ten times
+/// slower than one. Returns the number that was set.
 int set_blas_threads(int wanted);
 
 /// Cores that nobody uses, from the load average of the last minute; at least 1.
 int idle_cores();
 
 /// While one lives, OpenMP regions entered from this thread run on it alone. CHOLMOD asks for four threads, whatever
-/// the machine has, for loops of microseconds: its factorisations were seen to take 1.3 to 1.8 times as long, more on a
-/// busy machine, where waiting threads spin.
+/// the machine has, for loops of microseconds. Its factorisations were seen to take 1.3 to 1.8 times as long with them.
+/// They take longer still on a busy machine, where waiting threads spin.
 class WithoutOpenMP {
  public:
   WithoutOpenMP();

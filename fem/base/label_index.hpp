@@ -5,8 +5,8 @@
 
 namespace flexboom {
 
-/// Where each label of a file is found, by a table when labels are dense and by bisection when they are not: memory
-/// grows with the number of labels, never with their size.
+/// Where each label of a file is found: by a table when labels are dense, by bisection when they are not. Memory grows
+/// with the number of labels, never with their size.
 class LabelIndex {
  public:
   explicit LabelIndex(const std::vector<long>& labels);

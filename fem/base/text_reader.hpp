@@ -19,8 +19,8 @@ std::string_view trimmed(std::string_view);
 /// Are these the same but for upper and lower case?
 bool same_but_case(std::string_view, std::string_view);
 
-/// A name as `known` spells it: itself, or where that is not known the only one that is the same but for case; else as
-/// it is.
+/// A name as `known` spells it: itself, or where that is not known the only one that is the same but for case. Else it
+/// comes back as it is.
 template <class Names>
 std::string spelled(std::string_view name, const Names& known) {
   const auto like = [name](std::string_view other) { return same_but_case(other, name); };

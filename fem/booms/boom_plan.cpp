@@ -15,8 +15,8 @@ namespace flexboom {
 namespace {
 
 constexpr int max_solid_order = 8;
-// A quarter of a circle in one element of degree p: quadratic fields (the contraction across in bending) are sines of
-// twice the angle, which polynomials follow better when nodes lie slightly nearer the middle. The bending frequencies
+// A quarter of a circle in one element of degree p. Quadratic fields (the contraction across in bending) are sines of
+// twice the angle. Polynomials follow those better when nodes lie slightly nearer the middle. The bending frequencies
 // of a bar of order 4 are wrong by 3e-6 instead of 1.6e-5.
 double uneven_quarter(int order) { return order <= 4 ? 0.05 : 0.022; }
 constexpr double slender_ratio = 62;   // length over half depth

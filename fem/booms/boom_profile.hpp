@@ -47,11 +47,11 @@ struct Profile {
   std::vector<int> side;  // nodes on the outer line of every run, ascending
 };
 
-/// Quadrilaterals between column lines and planes. A quadrilateral with a singular corner A, of corners A B C D, is cut
-/// `levels` times along the diagonal through A: the points at `factor` on AB, AD and AC make a small quadrilateral at A
-/// and two trapezoids. BC and CD stay whole, and whatever shares AB or AD has its corner at A as well, so the mesh
-/// conforms without rings along the whole boom (geometric meshes of hp-FEM: Schwab, p- and hp-Finite Element Methods,
-/// 1998, ch. 4).
+/// Quadrilaterals between column lines and planes. A quadrilateral ABCD with a singular corner A is cut `levels` times
+/// along the diagonal through A. The points at `factor` on AB, AD and AC make a small quadrilateral at A and two
+/// trapezoids. BC and CD stay whole, and whatever shares AB or AD has its corner at A as well. So the mesh conforms
+/// without rings along the whole boom. Such meshes are the geometric meshes of hp-FEM (Schwab, p- and hp-Finite Element
+/// Methods, 1998, ch. 4).
 Profile make_profile(const std::vector<BoomLayer>&, const ProfileOptions&);
 
 }  // namespace flexboom

@@ -44,7 +44,7 @@ std::optional<SolidOptions> refined(const SolidOptions& complete, int steps);
 
 /// Hexahedra (or tetrahedra from cutting them) on the exact geometry of a boom, in the axes of BeamGeometry. Inside an
 /// element the geometry is the polynomial through its nodes. Nodes of flat surfaces lie on them. Those of round
-/// surfaces are a little off, all by one factor: the polynomials enclose the area of the circle, so mass is exact for
+/// surfaces are a little off, all by one factor. The polynomials enclose the area of the circle, so mass is exact for
 /// any order.
 ///
 /// Where a clamped face ends at a free surface the stress is infinite (for nu = 0.33 it grows like distance^-0.29),
@@ -55,8 +55,8 @@ std::optional<SolidOptions> refined(const SolidOptions& complete, int steps);
 /// named attachment (its reference node). Element sets "segment_1", ... . One SolidProperty per different material.
 ///
 /// An attachment at the tip is bolted to the face: its reference node holds the nodes of the face as one rigid body
-/// (RigidConnection). Elsewhere it rides on the mean motion of its section (DistributingConnection), because a rigid
-/// section inside the boom would add stiffness that a lumped mass does not have.
+/// (RigidConnection). Elsewhere it rides on the mean motion of its section (DistributingConnection). A rigid section
+/// inside the boom would add stiffness that a lumped mass does not have.
 ///
 /// @throws InputError naming the first fault: as BeamGeometry::validate, a section without outline, a step that cannot
 /// be meshed, an element, order or size that does not exist.

@@ -52,8 +52,8 @@ Cells linear_hex(const Cell& cell, int order) { return hex_of(cell, order, false
 Cells serendipity_hex(const Cell& cell, int order) { return hex_of(cell, order, false); }
 Cells full_hex(const Cell& cell, int order) { return hex_of(cell, order, true); }
 
-// Six tetrahedra: the corner of smallest number is the tip of a pyramid over each face that it is not on, and a face is
-// cut through its corner of smallest number. Both sides of a face see the same numbers, so cuts conform.
+// Six tetrahedra. The corner of smallest number is the tip of a pyramid over each face that it is not on. A face is cut
+// through its corner of smallest number. Both sides of a face see the same numbers, so cuts conform.
 Cells tetrahedra(const Cell& cell, int order) {
   const auto number = [&](int c) { return middle(cell, order, c, c); };
   int tip = 0;

@@ -21,7 +21,7 @@ std::span<const MeshFormat> mesh_formats();
 
 /// Reads a mesh, the format being told by the extension. Nodes that no element uses are kept only where a connection,
 /// mass or set needs them.
-/// @throws InputError with file:line (byte offset in binary files), what was wrong, and what would be right; also where
+/// @throws InputError with file:line (byte offset in binary files), what was wrong, and what would be right. Also where
 /// a dialect is given for a file that is no deck.
 MeshFile read_mesh(const std::filesystem::path&, const ReadOptions& = {});
 

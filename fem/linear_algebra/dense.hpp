@@ -6,8 +6,8 @@ namespace flexboom {
 
 enum class Transposed { no, yes };
 
-/// Y += factor * A X, or A^T X, by the BLAS: its kernels are those of the processor that it runs on, Eigen's those of
-/// the processor that the program was compiled for. For tall blocks; Y is neither A nor X.
+/// Y += factor * A X, or A^T X, by the BLAS. Its kernels are those of the processor that it runs on. Eigen's are those
+/// of the processor that the program was compiled for. For tall blocks; Y is neither A nor X.
 void add_product(Eigen::Ref<Eigen::MatrixXd> Y, double factor, Transposed, const Eigen::Ref<const Eigen::MatrixXd>& A,
                  const Eigen::Ref<const Eigen::MatrixXd>& X);
 
@@ -22,7 +22,7 @@ Eigen::MatrixXd transposed_product(const Eigen::Ref<const Eigen::MatrixXd>& A,
 Eigen::MatrixXd product(const Eigen::Ref<const Eigen::MatrixXd>& A, const Eigen::Ref<const Eigen::MatrixXd>& X);
 
 /// Eigenvalues and right eigenvectors of a real matrix, of length 1. Of a conjugate pair the eigenvalue with the
-/// positive imaginary part comes first, and the two columns are the real and the imaginary part of its vector.
+/// positive imaginary part comes first. The two columns are the real and the imaginary part of its vector.
 struct RealEigenvectors {
   Eigen::VectorXd real, imaginary;
   Eigen::MatrixXd vectors;

@@ -20,8 +20,9 @@ constexpr int small_problem = 2000;  // unknowns; below, every order is cheap
 /// Levels in a slice: of 2 to 16 tried on bars of 6 x 6 to 16 x 16 quadratic elements, 4 gave the least work or nearly.
 constexpr int slice_levels = 4;
 
-/// Bodies this much longer than wide are cut across only. Of quadratic bars 4 to 21 times as long as wide, METIS alone
-/// took 23 to 55 % more work than slices and as long as a tenth of the factorisation, AMD 1.8 to 8 times the work.
+/// Bodies this much longer than wide are cut across only. Measured were quadratic bars 4 to 21 times as long as wide.
+/// METIS alone took 23 to 55 % more work than slices, and as long as a tenth of the factorisation. AMD took 1.8 to 8
+/// times the work.
 constexpr double slender_from = 3.5;
 
 /// The graph as CHOLMOD reads it: lower triangle, pattern only.

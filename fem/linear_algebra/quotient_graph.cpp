@@ -139,8 +139,8 @@ std::vector<int> count_cost(const QuotientGraph& graph, const std::vector<int>& 
 }
 
 std::vector<int> postordered(const std::vector<int>& order, const std::vector<int>& parent) {
-  // A place comes right before its later siblings' subtrees are done; parents have higher places than their children,
-  // so sizes and positions of subtrees follow in one pass each.
+  // A place comes right before its later siblings' subtrees are done. Parents have higher places than their children.
+  // So sizes and positions of subtrees follow in one pass each.
   std::vector<int> size(order.size(), 1), end(order.size());
   for (size_t k = 0; k < order.size(); ++k) {
     if (parent[k] >= 0) size[at(parent[k])] += size[k];

@@ -23,8 +23,8 @@ FLEXBOOM_INLINE void scale(LaneRow<Register, registers>& y, double a) {
   for (int p = 0; p < registers; ++p) y.part[p].of *= a;
 }
 
-/// Neighbouring columns of one block from the diagonal down, so few that their part of x stays in registers while every
-/// other row of x comes and goes once for all of them.
+/// Neighbouring columns of one block from the diagonal down. They are so few that their part of x stays in registers.
+/// Every other row of x comes and goes once for all of them.
 struct Panel {
   const double* value;  // of the diagonal entry of the first column
   Index stride;         // from column to column

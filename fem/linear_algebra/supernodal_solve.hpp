@@ -5,8 +5,8 @@
 namespace flexboom {
 
 /// L of L L^T as CHOLMOD keeps it in dense blocks. Block s has the columns [column[s], column[s + 1]) and the rows
-/// row[row_start[s] ...], the first of which are those columns themselves; its entries lie column by column from
-/// value[value_start[s]], what is above the diagonal unused.
+/// row[row_start[s] ...], the first of which are those columns themselves. Its entries lie column by column from
+/// value[value_start[s]]. What is above the diagonal is unused.
 struct Supernodes {
   int count;
   const int* column;

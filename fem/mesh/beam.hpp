@@ -30,8 +30,8 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> interpolation(const Mesh&, const Elemen
 /// Point of the axis at (s, -, -).
 Eigen::Vector3d position(const Mesh&, const Element&, const Eigen::Vector3d& at);
 
-/// @throws InputError for a zero length, a theory that is not the row's, a section axis along the beam, and a line mass
-/// that does not run along an axis of the mesh.
+/// @throws InputError for a zero length, a theory that is not the table entry's, or a section axis along the beam. Also
+/// for a line mass that does not run along an axis of the mesh.
 void validate(const Mesh&, const Element&);
 
 }  // namespace flexboom::beam

@@ -6,7 +6,7 @@
 
 #include <array>
 
-// Many displacement fields at the points of a solid at once: kept with the fields side by side, so that every step is
+// Many displacement fields at the points of a solid at once. The fields are kept side by side, so that every step is
 // one over neighbours in memory.
 namespace flexboom::elasticity {
 

@@ -44,9 +44,9 @@ struct ElementType {
   /// Strains at all strain points of each column of q (freedoms x k), scaled such that q_i^T K q_j [J] is the product
   /// of the rows i and j: k x strains.
   Eigen::MatrixXd (*energy_strains)(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q);
-  /// Adds the second-order work of prestress [N m]: of each static displacement q0 (freedoms x loads) and each pair of
-  /// columns of q (freedoms x k), the integral of the stress of q0 times the second-order strain of the pair. Rows are
-  /// the lower triangle of the k x k matrix column by column, columns the loads: k (k + 1) / 2 x loads.
+  /// Adds the second-order work of prestress [N m], of each static displacement q0 (freedoms x loads) and each pair of
+  /// columns of q (freedoms x k). The work is the integral of the stress of q0 times the second-order strain of the
+  /// pair. Rows are the lower triangle of the k x k matrix column by column, columns the loads: k (k + 1) / 2 x loads.
   void (*add_prestress_work)(const Mesh&, const Element&, const Eigen::Ref<const Eigen::MatrixXd>& q0,
                              const Eigen::Ref<const Eigen::MatrixXd>& q, Eigen::Ref<Eigen::MatrixXd> work);
   /// @throws InputError on what makes the element impossible (zero length, inverted, property missing or in conflict).

@@ -113,8 +113,8 @@ const std::vector<int>& node_set(const Mesh&, const std::string& name);
 /// Number of parts of a mesh that no element, connection or equation joins.
 int part_count(const Mesh&);
 
-/// What is allowed and most likely a mistake: corners turned inside out, several parts, coincident nodes that nothing
-/// joins, a mean density that no material has (units mixed up). One sentence each.
+/// What is allowed and most likely a mistake. Such are corners turned inside out, several parts, coincident nodes that
+/// nothing joins, or a mean density that no material has (units mixed up). One sentence each.
 std::vector<std::string> suspicions(const Mesh&);
 
 }  // namespace flexboom

@@ -10,8 +10,8 @@ namespace flexboom {
 /// Ascending, each once.
 std::vector<int> sorted_unique(std::vector<int>);
 
-/// Leaves out of the mesh every node that no element, body, support, connection or equation uses, also from node sets;
-/// sets that are then empty go as well. `notes` get how many.
+/// Leaves out of the mesh, and of its node sets, every node that no element, body, support, connection or equation
+/// uses. Sets that are then empty go as well. `notes` get how many.
 void drop_unused_nodes(Mesh&, std::vector<std::string>& notes);
 
 /// Labels for a file: those of the mesh if there are `count`, positive and different, else 1, 2, 3, ...

@@ -10,7 +10,7 @@
 // Cross-sections in logical coordinates, for structured meshes of booms.
 //
 // A section is a core and rings around it. A point of ring k has tau in [k, k + 1] across the ring and u in [0, 4]
-// around it, side 0 facing +y, side 1 facing +z; u is an integer at the corners of a rectangle and at +-45 degrees of a
+// around it. Side 0 faces +y, side 1 faces +z. u is an integer at the corners of a rectangle and at +-45 degrees of a
 // circle. A point of the core has a, b in [0, 1], along y and z; its outline is tau = 0. Tubes have rings only. The
 // shape of the core is free: its sides are arcs of parabolas, so that the angles of the quadrilaterals stay away from
 // 180 degrees.

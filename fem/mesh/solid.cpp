@@ -25,8 +25,8 @@ using Eigen::VectorXd;
 using elasticity::Lame;
 
 // What a kind is made of. Rules are those of CalculiX (C3D20, C3D20R, C3D10, C3D15, C3D8I), whose frequencies on one
-// mesh are then ours, as long as they leave every element its exact mass, centre and inertia where its map is affine.
-// The one mass point of C3D4 and the two of C3D6 lose the element's own inertia: here they have more.
+// mesh are then ours. A rule is taken only if it leaves every element its exact mass, centre and inertia where its map
+// is affine. The one mass point of C3D4 and the two of C3D6 lose the element's own inertia: here they have more.
 struct Recipe {
   Index nodes;
   ShapeFunctions (*shapes)(const Vector3d&);

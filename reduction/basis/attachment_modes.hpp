@@ -15,7 +15,7 @@ struct AttachmentLoad {
 
 /// Residual attachment modes (MacNeal 1971; Rubin 1975): the basis with, for each load, the static shape less what is
 /// in the span of the shapes before it, M-orthogonal to all others, Me_kk = m. The response to the loads is then exact
-/// for slow motion. `clamp` is what the basis was made with; a body that it leaves free is loaded together with the
+/// for slow motion. `clamp` is what the basis was made with. A body that it leaves free is loaded together with the
 /// inertia forces of its rigid motion (inertia relief). A load that adds no shape of its own is left out and named in
 /// `summary.note`.
 /// @throws InputError for an unknown marker or direction, and a torque on a marker without rotation.

@@ -8,10 +8,10 @@
 
 namespace flexboom {
 
-/// Mean motion of nodes, as a distributing connection (RBE3) has it at their centre: rows ux uy uz rx ry rz over the
-/// freedoms of the mesh. Weights, of sum 1, are equal where none are given. Rotations are the mean of the nodes' own
-/// where they have any; nodes of solids on a line or alone take those of all nodes of the elements around them.
-/// `turns`: whether there are rotations at all.
+/// Mean motion of nodes, as a distributing connection (RBE3) has it at their centre. It has the rows ux uy uz rx ry rz
+/// over the freedoms of the mesh. Weights, of sum 1, are equal where none are given. Rotations are the mean of the
+/// nodes' own where they have any. Nodes of solids on a line or alone take those of all nodes of the elements around
+/// them. `turns`: whether there are rotations at all.
 struct MeanMotion {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // centre of the nodes, mesh axes [m]
   std::vector<Eigen::Triplet<double>> rows;            // (component, freedom, coefficient)

@@ -16,11 +16,11 @@ struct CraigBamptonOptions {
   std::vector<ModeKind> kinds = {};  // of the normal modes; empty: all
 };
 
-/// Craig-Bampton basis (Craig, Bampton, AIAA Journal 6, 1968): the static shapes Psi_c of a unit motion of each kept
-/// interface freedom with the others held, interface after interface, then the normal modes Phi_n with all interfaces
-/// held, in the sizes and signs of clamped_modes. `clamp` is held beside the interfaces.
-/// @throws InputError when the interfaces held leave the body free to move, a kept freedom is supported or tied to
-/// another, the reference does not exist or does not hold the body; else as clamped_modes.
+/// Craig-Bampton basis (Craig, Bampton, AIAA Journal 6, 1968). First come the static shapes Psi_c of a unit motion of
+/// each kept interface freedom with the others held, interface after interface. Then come the normal modes Phi_n with
+/// all interfaces held, in the sizes and signs of clamped_modes. `clamp` is held beside the interfaces.
+/// @throws InputError when the interfaces held leave the body free to move, or a kept freedom is supported or tied to
+/// another. Also when the reference does not exist or does not hold the body. Else as clamped_modes.
 ModalBasis craig_bampton(const Mesh&, const Assembly&, std::vector<InterfaceNode>, const CraigBamptonOptions&,
                          const Clamp& clamp = {}, int threads = 1);
 

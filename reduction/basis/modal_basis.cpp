@@ -119,7 +119,7 @@ struct Reduced {
   SparseMatrix K, M;
 };
 
-/// Adds the groups that the solver could not see: the assembled K of a slender body leaves more noise between double
+/// Adds the groups that the solver could not see. The assembled K of a slender body leaves more noise between double
 /// frequencies than the strain energies of their modes do. `Phi`: M-orthonormal, over all freedoms.
 EigenSummary with_equal_energies(const ModalModel& model, const MatrixXd& Phi, const VectorXd& lambda,
                                  EigenSummary summary, int threads) {

@@ -42,7 +42,7 @@ void renumber(Interface&, const std::vector<int>& modes);
 ModalBasis selected(const ModalBasis&, const std::vector<int>& modes);
 
 /// Modes of the mesh with the nodes of `clamp` fixed. Groups of equal frequencies are aligned to the body's axes
-/// (deflection of the tip along y first, then z, x, rotations), signs are fixed: positive tip deflection along the
+/// (deflection of the tip along y first, then z, x, rotations). Signs are fixed: positive tip deflection along the
 /// local axis (positive tip rotation for torsion). Shapes are scaled so that the tip deflection is 2, as in eq. 14;
 /// torsion to Me_kk = m (see README). What nothing holds is free and its rigid modes come first.
 /// @throws InputError, NumericalError as solve_modes.

@@ -35,9 +35,9 @@ std::vector<int> tip_nodes(const Mesh& mesh, const Clamp& clamp) {
   return nodes;
 }
 
-/// Shares of nodes of solids in the area that they cover, int N_a dA, whatever the mesh of the face: N_a vanishes on
-/// all other faces of the elements with a node there but the outer ones beside it, which stand on it, so it is the
-/// part along the normal of int grad N_a dV. None where the nodes cover no face of the body.
+/// Shares of nodes of solids in the area that they cover, int N_a dA, whatever the mesh of the face. N_a vanishes on
+/// all other faces of the elements with a node there, but the outer ones beside it. Those stand on the face, so the
+/// share is the part along the normal of int grad N_a dV. None where the nodes cover no face of the body.
 std::vector<double> face_shares(const Mesh& mesh, const std::vector<int>& nodes) {
   std::vector<Index> place(static_cast<size_t>(mesh.nodes.cols()), -1);
   for (size_t i = 0; i < nodes.size(); ++i) place[static_cast<size_t>(nodes[i])] = static_cast<Index>(i);
@@ -67,7 +67,7 @@ std::vector<double> face_shares(const Mesh& mesh, const std::vector<int>& nodes)
   return {shares.begin(), shares.end()};
 }
 
-/// Motions e^s along x, y, z and e^s of twist about the long axis, s = 0 .. 1 along the body, over all freedoms: no
+/// Motions e^s along x, y, z and e^s of twist about the long axis, s = 0 .. 1 along the body, over all freedoms. No
 /// bending, torsion or stretching of a body, symmetric or not, is orthogonal to them.
 MatrixXd growing_motions(const Mesh& mesh, const DofMap& dofs, int axis) {
   const Vector3d low = mesh.nodes.rowwise().minCoeff();
@@ -154,8 +154,9 @@ MatrixXd ModeConvention::functionals(const MatrixXd& Phi) const {
 }
 
 void ModeConvention::align(MatrixXd& Phi, const std::vector<std::vector<int>>& groups) const {
-  // M-orthonormal shapes have tip deflections of the order of 1 / sqrt(m). 1e-5 of that: far above what the solver
-  // leaves in a mode of the other plane, far below a real motion. Mean motions fall off with the number of the mode.
+  // M-orthonormal shapes have tip deflections of the order of 1 / sqrt(m). The limit is 1e-5 of that. It is far above
+  // what the solver leaves in a mode of the other plane, and far below a real motion. Mean motions fall off with the
+  // number of the mode.
   const double deflection = 1 / std::sqrt(mass_);
   VectorXd limit(10);
   limit << VectorXd::Constant(3, 1e-5 * deflection), VectorXd::Constant(3, 1e-5 * deflection / length_),
@@ -167,9 +168,9 @@ void ModeConvention::align(MatrixXd& Phi, const std::vector<std::vector<int>>& g
   }
 }
 
-/// 2 over the tip's deflection, or sqrt(m) with the sign of the tip's leading motion, of the mean motion, or of the
-/// largest entry, the first that is there. Where the tip hardly moves (under a tenth of the root-mean-square motion of
-/// the body, 1 / sqrt(m)) a deflection of 2 would blow the shape up.
+/// 2 over the tip's deflection, else sqrt(m) with a sign. The sign is that of the tip's leading motion, of the mean
+/// motion, or of the largest entry: the first that is there. Where the tip hardly moves (under a tenth of the
+/// root-mean-square motion of the body, 1 / sqrt(m)) a deflection of 2 would blow the shape up.
 double ModeConvention::factor(const VectorXd& phi, const VectorXd& tip, const VectorXd& mean, int component) const {
   const double rms = 1 / std::sqrt(mass_);
   if (component < 0) {

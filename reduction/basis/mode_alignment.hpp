@@ -13,12 +13,13 @@ namespace flexboom {
 /// Direction, sign and size of modes, so that they depend neither on the solver nor on the numbering of the mesh.
 class ModeConvention {
  public:
-  /// The tip is the mean of the node set "tip", by area where its nodes cover a face; else of the nodes furthest from
-  /// what is clamped.
+  /// The tip is the mean of the node set "tip", by area where its nodes cover a face. Without that set it is the mean
+  /// of the nodes furthest from what is clamped.
   ModeConvention(const Mesh&, const Assembly&, const Clamp&);
 
-  /// Turns each group of M-orthonormal columns of Phi (all freedoms x n): they take up, one after the other, the tip's
-  /// deflection along y, z, x, its rotations about x, y, z, then the weighted mean motions of the body.
+  /// Turns each group of M-orthonormal columns of Phi (all freedoms x n). The columns take up motions one after the
+  /// other: the tip's deflection along y, z, x, its rotations about x, y, z. After these come the weighted mean motions
+  /// of the body.
   void align(Eigen::MatrixXd& Phi, const std::vector<std::vector<int>>& groups) const;
 
   /// Scales M-orthonormal columns: tip deflection +2 along the leading direction of the mode; Me = m for torsion and

@@ -42,8 +42,8 @@ Eigen::MatrixXd effective_masses(const ReducedBody&);
 /// largest first. @throws InputError when all of them do not reach it, saying what they reach.
 std::vector<int> modes_by_effective_mass(const ReducedBody&, double fraction, const std::vector<int>& directions);
 
-/// Share of every coordinate in the rigid mass matrix M_r as a whole, L_k^T M_r^-1 L_k / (6 Me_kk) (5 for a line mass):
-/// independent of frame and origin, sum over all modes of a clamped body 1.
+/// Share of every coordinate in the rigid mass matrix M_r as a whole, L_k^T M_r^-1 L_k / (6 Me_kk) (5 for a line mass).
+/// It is independent of frame and origin. Its sum over all modes of a clamped body is 1.
 Eigen::VectorXd completeness_indices(const ReducedBody&);
 
 /// The fewest coordinates whose indices sum up to a fraction. @throws InputError as modes_by_effective_mass.
@@ -55,9 +55,9 @@ struct ObservedOutput {
   std::string direction;  // "ux" .. "rz"
 };
 
-/// Share of every coordinate in the response at outputs to white noise with equal modal damping, outputs x n: the
-/// observability Gramian S_k^2 / (Me_kk omega_k^3) (Gawronski, Dynamics and Control of Structures, 1998), each row over
-/// its largest entry. Coordinates without frequency count as the largest where they move the output.
+/// Share of every coordinate in the response at outputs to white noise with equal modal damping, outputs x n. The share
+/// is the observability Gramian S_k^2 / (Me_kk omega_k^3) (Gawronski, Dynamics and Control of Structures, 1998). Each
+/// row is divided by its largest entry. Coordinates without frequency count as the largest where they move the output.
 Eigen::MatrixXd observabilities(const ReducedBody&, const std::vector<ObservedOutput>&);
 
 /// Coordinates whose share is at least `threshold` at one of the outputs.

@@ -11,7 +11,7 @@
 
 namespace flexboom {
 
-/// Unknowns that hold a free body without straining it, as many as it has rigid motions: the pivots of a QR
+/// Unknowns that hold a free body without straining it, as many as it has rigid motions. They are the pivots of a QR
 /// factorisation of the motions of what elements resist, lengths scaled to the body.
 std::vector<int> determinate_support(const Mesh&, const DofMap&, const Unknowns&);
 
@@ -30,8 +30,8 @@ class StaticSolver {
   /// x of loads f (all unknowns x k), zero where held.
   Eigen::MatrixXd loaded(const Eigen::MatrixXd& f) const;
 
-  /// The same at half the time, without a second solve for the digits that the factor of a slender body loses; and the
-  /// loads that are left over, f - K x, zero where held.
+  /// The same at half the time, without a second solve for the digits that the factor of a slender body loses. The
+  /// second matrix is the loads that are left over, f - K x, zero where held.
   std::pair<Eigen::MatrixXd, Eigen::MatrixXd> loaded_once(const Eigen::MatrixXd& f) const;
 
  private:

@@ -98,8 +98,8 @@ MatrixXd values_at(const LinearFields& fields, const Vector3d& u0) {
   return b;
 }
 
-/// Loads on what turns as one: of each (columns) the entries xx, yy, zz, xy, yz, zx of the symmetric W that has
-/// theta^T W theta as the work on the second-order displacement theta x (theta x r) / 2, taken off.
+/// Loads on what turns as one. Each load has a column: the entries xx, yy, zz, xy, yz, zx of a symmetric matrix W. Half
+/// of theta^T W theta is minus the work of the load on the second-order displacement theta x (theta x r) / 2.
 class LoadsOnArms {
  public:
   explicit LoadsOnArms(Index loads) : W_(6, loads) { W_.setZero(); }

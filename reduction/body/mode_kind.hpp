@@ -16,7 +16,7 @@ std::string_view name_of(ModeKind);
 /// Coordinate axis (0, 1, 2) along which the mesh is longest.
 int long_axis(const Mesh&);
 
-/// Kinds of shapes (freedoms x n) by their kinetic energy: a kind is named when more than half of the energy is the
+/// Kinds of shapes (freedoms x n) by their kinetic energy. A kind is named when more than half of the energy is the
 /// mean motion of the sections in that direction, or their twist. `weights` is the diagonal of M. No mode is called
 /// rigid here.
 std::vector<ModeKind> mode_kinds(const Mesh&, const DofMap&, const Eigen::VectorXd& weights,

@@ -146,8 +146,8 @@ Eigen::Matrix3d inertia_of(const Eigen::Matrix3d& W) {
   return W.trace() * Eigen::Matrix3d::Identity() - (W + W.transpose()) / 2;
 }
 
-/// De that damps every mode phi of (Ke, Me) by 2 zeta omega: sum over modes of 2 zeta omega Me phi phi^T Me, with
-/// phi^T Me phi = 1 (Clough and Penzien, Dynamics of Structures, on proportional damping matrices).
+/// De that damps every mode phi of (Ke, Me) by 2 zeta omega. It is the sum over modes of 2 zeta omega Me phi phi^T Me,
+/// with phi^T Me phi = 1. See Clough and Penzien, Dynamics of Structures, on proportional damping matrices.
 Eigen::MatrixXd modal_damping(const ReducedBody& body, double zeta) {
   if (is_diagonal(body.Ke) && is_diagonal(body.Me)) {
     const Eigen::ArrayXd stiffness = body.Ke.diagonal().array().max(0.0);

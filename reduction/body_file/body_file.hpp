@@ -27,8 +27,8 @@ struct BodyFile {
 void write_body_file(const std::filesystem::path&, const ReducedBody&, const RicherBodies& = {});
 
 /// Content of a file that `write_body_file` made.
-/// @throws InputError naming the file if it cannot be read, is something else or of a newer version, was changed or
-/// damaged after it was written, or holds no valid body.
+/// @throws InputError naming the file if it cannot be read, is something else, is of a newer version or holds no valid
+/// body. Also if it was changed or damaged after it was written.
 BodyFile read_whole_body_file(const std::filesystem::path&);
 
 /// The body alone. @throws InputError as read_whole_body_file.

@@ -36,7 +36,7 @@ constexpr double infinite_nu = 1e-14;
 /// with mass. Elements with fewer mass points than nodes have fewer of them than freedoms.
 int finite_eigenvalues(const EigenProblem&);
 
-/// From this many unknowns on, backends are content with fewer digits unless they are told: solves cost time then, and
+/// From this many unknowns on, backends are content with fewer digits unless they are told. Solves cost time then, and
 /// an eigenvalue is as good as the square of its residual. Smaller problems keep all digits of their vectors.
 constexpr int many_unknowns = 2000;
 

@@ -106,7 +106,7 @@ class BlockLanczos {
     return X;
   }
 
-  /// Random vectors, the first of them small beside the shapes that are given, taken through the inverse once: that
+  /// Random vectors, the first of them small beside the shapes that are given, taken through the inverse once. That
   /// leaves nothing of freedoms without mass in them, and little of high modes. Returns how many were outside the
   /// basis.
   Index start_afresh() {

@@ -8,9 +8,9 @@
 
 namespace flexboom {
 
-// With K - sigma M = L L^T the problem becomes L^-1 M L^-T y = nu y, nu = 1 / (omega^2 - sigma), phi = L^-T y: the
-// lowest modes are the largest nu, which the QR algorithm gives to full relative precision, and a singular M only adds
-// nu = 0.
+// With K - sigma M = L L^T the problem becomes L^-1 M L^-T y = nu y, nu = 1 / (omega^2 - sigma), phi = L^-T y. The
+// lowest modes are the largest nu, which the QR algorithm gives to full relative precision. A singular M only adds zero
+// values of nu.
 EigenPairs dense_modes(const EigenProblem& problem, const SparseFactor&, const EigenRequest& request) {
   const double sigma = request.sigma;
   const Eigen::MatrixXd M = Eigen::MatrixXd(problem.M).selfadjointView<Eigen::Lower>();

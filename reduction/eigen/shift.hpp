@@ -42,14 +42,15 @@ class ShiftedFactor {
 };
 
 /// Problems up to this size are factorised as L D L^T, whose negative pivots say how many eigenvalues lie below the
-/// shift; larger ones as supernodal L L^T, which is faster.
+/// shift. Larger ones are factorised as supernodal L L^T, which is faster.
 constexpr int indefinite_unknowns = 2000;
 
 /// Scale of the highest eigenvalues [rad^2/s^2]: the largest Rayleigh quotient of a unit vector.
 double stiffness_scale(const EigenProblem&);
 
-/// What round-off leaves in the energy phi^T (K - sigma M) phi: a unit in the last place of each term of the sum, which
-/// add up like errors of their own. Of rigid modes ten were found at most, of a clamped tube of 200 diameters 4700.
+/// What round-off leaves in the energy phi^T (K - sigma M) phi. It is a unit in the last place of each term of the sum;
+/// these add up like independent errors. Of rigid modes ten were found at most, of a clamped tube of 200 diameters
+/// 4700.
 double energy_round_off(const EigenProblem&, double sigma, const Eigen::Ref<const Eigen::VectorXd>& phi);
 
 /// An energy of fewer such units is zero.
@@ -59,9 +60,9 @@ constexpr double no_digit = 32;
 /// next is 100 times larger.
 int zero_modes(const EigenProblem&, const EigenPairs&);
 
-/// Shift for a body that can move freely: minus a tenth of the first elastic eigenvalue, so that the rigid modes are
-/// well apart from it and K - sigma M is as well conditioned as it can be. A first solve of few modes and digits finds
-/// that eigenvalue; when its own shift is good enough, it is returned and its factor is in place.
+/// Shift for a body that can move freely: minus a tenth of the first elastic eigenvalue. The rigid modes are then well
+/// apart from it, and K - sigma M is as well conditioned as it can be. A first solve of few modes and digits finds that
+/// eigenvalue. When its own shift is good enough, it is returned and its factor is in place.
 double free_shift(const EigenProblem&, ShiftedFactor&, int num_modes);
 
 }  // namespace flexboom

@@ -69,7 +69,7 @@ struct EigenPairs {
 };
 
 /// What is asked of a backend: the `count` eigenvalues nearest above sigma. The first `wanted` shall have the relative
-/// residual `tolerance` (0: the backend's own choice); the others serve to see the gap above them and may be coarser.
+/// residual `tolerance` (0: the backend's own choice). The others serve to see the gap above them and may be coarser.
 struct EigenRequest {
   double sigma = 0;
   int wanted = 1;
@@ -86,8 +86,8 @@ struct EigenBackend {
 /// The table of backends: "arpack", "block", "spectra", "dense".
 std::span<const EigenBackend> eigen_backends();
 
-/// The lowest modes: ascending, M-orthonormal, sign not fixed, verified. Asks the backend for a few more than wanted so
-/// that the Sturm count is taken in a gap and no group of equal frequencies is cut without being noticed.
+/// The lowest modes: ascending, M-orthonormal, sign not fixed, verified. Asks the backend for a few more than wanted.
+/// So the Sturm count is taken in a gap, and no group of equal frequencies is cut without being noticed.
 /// @throws InputError for more modes than unknowns that carry mass, an entry of K or M that is not finite, or an
 /// unknown backend (listing those that exist).
 /// @throws NumericalError when a residual, the orthogonality, the Sturm count or the check that stands in for it fails.

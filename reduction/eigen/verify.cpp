@@ -57,8 +57,8 @@ MatrixXd orthonormalise(const EigenProblem& p, MatrixXd& Phi) {
 }
 
 /// Looks for modes that are missing, from random vectors outside those found, taken through the inverse twice. Their
-/// Rayleigh quotients are never below the lowest eigenvalue that is missing (Courant-Fischer): one below the last mode
-/// found proves that a mode was missed, none makes it unlikely.
+/// Rayleigh quotients are never below the lowest eigenvalue that is missing (Courant-Fischer). One below the last mode
+/// found proves that a mode was missed; none makes it unlikely.
 class Search {
  public:
   Search(const EigenProblem& p, const MatrixXd& Phi, const MatrixXd& M_Phi)
@@ -138,8 +138,8 @@ VectorXd residuals(const EigenProblem& p, const SparseFactor& shifted, const Eig
 }
 
 /// Whether eigenvalues i and i + 1 are one to the accuracy they are known to. The measure is lambda - sigma, which is
-/// what the solver resolves; 1e-7 is some ten times the noise that the assembled K of a slender round bar leaves
-/// between its double frequencies (the lowest lose most digits).
+/// what the solver resolves. The bound 1e-7 is some ten times the noise that the assembled K of a slender round bar
+/// leaves between its double frequencies. The lowest frequencies lose most digits.
 bool same_group(const EigenPairs& pairs, const VectorXd& residual, Index i) {
   const double noise = 10 * std::max(residual(i), residual(i + 1));
   return pairs.lambda(i + 1) - pairs.lambda(i) <= std::max(1e-7, noise) * (pairs.lambda(i + 1) - pairs.summary.sigma);

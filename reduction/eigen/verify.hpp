@@ -4,10 +4,10 @@
 
 namespace flexboom {
 
-/// Checks what a backend returned for the shift that is in place, and makes it what solve_modes promises: sorted,
-/// M-orthonormal, cut to options.num_modes, groups listed, completeness counted or probed, summary filled.
-/// `complete`: there are no more eigenvalues than those found.
-/// Returns false when no gap was found above the modes wanted: more of them must be computed.
+/// Checks what a backend returned for the shift that is in place, and makes it what solve_modes promises. The modes are
+/// sorted, M-orthonormal and cut to options.num_modes. Groups are listed, completeness is counted or probed, the
+/// summary is filled. `complete`: there are no more eigenvalues than those found. Returns false when no gap was found
+/// above the modes wanted: more of them must be computed.
 /// @throws NumericalError when the answer is wrong.
 bool verify(const EigenProblem&, ShiftedFactor&, const EigenOptions&, bool complete, EigenPairs&);
 

@@ -4,8 +4,8 @@
 
 namespace flexboom {
 
-/// The linear model that attitude control toolboxes want of an appendage: with x the motion of the BRF origin (3
-/// displacements, 3 rotations, BRF axes), W the force and torque that the base exerts there, unit modal masses,
+/// The linear model that attitude control toolboxes want of an appendage. x is the motion of the BRF origin (3
+/// displacements, 3 rotations, BRF axes). W is the force and torque that the base exerts there. With unit modal masses,
 ///   W = M_r x'' + L_P q'',   q'' + diag(2 zeta omega) q' + diag(omega^2) q = -L_P^T x''
 struct CouplingFile {
   std::string name;

@@ -74,8 +74,9 @@ struct ExportReport {
   std::vector<BodyCheck> checks;  // of the files, read back; empty where the format has no reader
 };
 
-/// Writes the body in that format and the coordinate table beside it (NAME.coordinates.csv, NAME the stem of `path`, in
-/// the folder of formats that are one), makes the folder, reads the files back and checks them against the body.
+/// Writes the body in that format and the coordinate table beside it, and makes the folder. The table is
+/// NAME.coordinates.csv, NAME the stem of `path`, inside the folder for formats that are one. Reads the files back and
+/// checks them against the body.
 /// @throws InputError for an unknown format or setting, and as `Exporter::write`.
 ExportReport export_body(const ReducedBody&, std::string_view format, const ExportOptions&,
                          const std::filesystem::path&);

@@ -9,8 +9,8 @@
 namespace flexboom {
 
 /// The body as EXUDYN's `ObjectFFRFreducedOrderInterface.LoadFromFile` reads it (HDF5, file version 1), SI, BRF axes.
-/// Mesh nodes are the points of the display, then six around each marker, on which `MarkerSuperElementRigid` with equal
-/// weights moves and turns as the marker does; `markerNames` and `markerNodes` tell which.
+/// Mesh nodes are the points of the display, then six around each marker. On those six, `MarkerSuperElementRigid` with
+/// equal weights moves and turns as the marker does; `markerNames` and `markerNodes` tell which.
 /// @throws InputError when the name does not end in .hdf5 (EXUDYN goes by that), for a body without coordinates,
 /// without points, or whose coordinates hold rigid motions.
 void write_exudyn(const ReducedBody&, const ExportOptions&, const std::filesystem::path&);

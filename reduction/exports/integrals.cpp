@@ -70,6 +70,11 @@ ModalCoordinates modal_coordinates(const ReducedBody& body) {
   }
   const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> solver(body.Ke, body.Me);
   ModalCoordinates modal{solver.eigenvectors(), solver.eigenvalues(), {}};
+  for (auto mode : modal.T.colwise()) {  // of the sign of the coordinate that it has most of
+    Eigen::Index most = 0;
+    mode.cwiseAbs().maxCoeff(&most);
+    if (mode[most] < 0) mode *= -1;
+  }
   for (const double lambda : modal.lambda) {
     modal.coordinates.push_back({"mode", std::sqrt(std::max(lambda, 0.0)) / (2 * std::numbers::pi)});
   }

@@ -39,7 +39,8 @@ class RawIntegrals {
 ReducedBody in_coordinates(const ReducedBody&, const Eigen::MatrixXd& T);
 
 /// Coordinates of unit modal mass: q = T q' with T^T Me T = I and T^T Ke T = diag(lambda). Only scaled where Me and Ke
-/// are diagonal already, else the modes of (Me, Ke) in ascending order, whose coordinate table says "mode".
+/// are diagonal already, else the modes of (Me, Ke) in ascending order, whose coordinate table says "mode". Each has
+/// the sign of the coordinate that it has most of.
 struct ModalCoordinates {
   Eigen::MatrixXd T;
   Eigen::VectorXd lambda;  // omega^2 [rad^2/s^2]

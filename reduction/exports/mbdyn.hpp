@@ -22,9 +22,9 @@ struct MbdynFile {
   Eigen::MatrixXd Inv8;  // 3 x 3n: -int tilde(u0) tilde(S_j)
   Eigen::MatrixXd Inv5;  // 3 x n n: int S_j x S_k, k counts faster
   Eigen::MatrixXd Inv9;  // 3 x 3n n: int tilde(S_j) tilde(S_k), k counts faster
-  /// Group 19: stiffness per unit of load 1..6 omega_x^2, omega_y^2, omega_z^2, omega_x omega_y, omega_y omega_z,
-  /// omega_z omega_x; 7..9 angular acceleration; 10..12 acceleration less gravity; from 13 forces and torques at the
-  /// nodes, six each.
+  /// Group 19: stiffness per unit of load. Loads 1..6 are omega_x^2, omega_y^2, omega_z^2, omega_x omega_y, omega_y
+  /// omega_z, omega_z omega_x. Loads 7..9 are angular acceleration, 10..12 acceleration less gravity. From 13 on they
+  /// are forces and torques at the nodes, six each.
   std::map<int, Eigen::MatrixXd> stiffening;
 };
 

@@ -45,9 +45,9 @@ std::span<const ExportSetting> sid_settings();
 /// Standard input data of a body. @throws InputError when the body has no gram.
 SidFile sid_file(const ReducedBody&, const ExportOptions&);
 
-/// Identities between the matrices, from the file alone: mdCM.m1 = Ct^T, Ge = 2 x the antisymmetric part of Cr.m1, the
-/// symmetric part of Gr = J.m1, its antisymmetric part = -tilde(Cr.m0), Oe.m0 from J.m1, effective masses within the
-/// mass.
+/// Identities between the matrices, from the file alone. They are mdCM.m1 = Ct^T, Ge = 2 x the antisymmetric part of
+/// Cr.m1, and Oe.m0 from J.m1. The symmetric part of Gr is J.m1, its antisymmetric part -tilde(Cr.m0). Effective masses
+/// stay within the mass.
 std::vector<BodyCheck> sid_identities(const SidFile&, double tolerance = 1e-10);
 
 /// Reads a file in the dialect that the options name. @throws InputError with file:line:column.

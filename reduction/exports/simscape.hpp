@@ -33,8 +33,9 @@ struct SimscapeRank {
 };
 SimscapeRank rank_of_stiffness(const SimscapeModel&);
 
-/// @throws InputError, saying how to make one that is, unless the body is of frame "free" with interfaces that keep all
-/// six components and whose coordinates are their motions: Craig-Bampton, before any change of coordinates.
+/// @throws InputError unless the body is of frame "free", its interfaces keep all six components and its coordinates
+/// are their motions. That is Craig-Bampton, before any change of coordinates. The message says how to make such a
+/// body.
 SimscapeModel simscape_model(const ReducedBody&);
 
 /// The model as a MAT file of level 5: variables P, Q, K, M, C, and for people `interfaces`, `units`, `program`.

@@ -10,17 +10,17 @@
 
 namespace flexboom {
 
-/// What a body can be asked without its mesh: identities between its invariants, Bessel's inequality |Ct_k|^2 <= m
-/// Me_kk and that of all coordinates together (the inertia they do not carry is positive semidefinite), Ct = Cr0 = 0
-/// under mean axes, diagonal Me and Ke of modes.
+/// What a body can be asked without its mesh. Checked are identities between its invariants and Bessel's inequality
+/// |Ct_k|^2 <= m Me_kk. The inequality is checked for all coordinates together as well: the inertia they do not carry
+/// is positive semidefinite. Ct = Cr0 = 0 is checked under mean axes, and diagonal Me and Ke of modes.
 std::vector<BodyCheck> body_checks(const ReducedBody&);
 
-/// The certificate of a body: check_invariants (other routes, another quadrature), strain energy of the six rigid
-/// motions, the response to unit forces at its markers against the full model (`clamp` is what the basis was made with;
-/// a reduced body is never softer, and how much stiffer it is says what its modes leave out), closed forms where the
-/// body is a uniform beam, and body_checks. `exact_at`: markers whose static response the basis holds (attachment
-/// modes, interfaces), to be equal to 1e-8. `statics`: of K over the unknowns that the clamp leaves, where the caller
-/// has it.
+/// The certificate of a body: check_invariants (other routes, another quadrature), body_checks and the strain energy of
+/// the six rigid motions. Closed forms are added where the body is a uniform beam. The response to unit forces at its
+/// markers is compared with the full model. A reduced body is never softer, and how much stiffer it is says what its
+/// modes leave out. `clamp` is what the basis was made with. `exact_at`: markers whose static response the basis holds
+/// (attachment modes, interfaces), to be equal to 1e-8. `statics`: of K over the unknowns that the clamp leaves, where
+/// the caller has it.
 std::vector<BodyCheck> certificate(const ReducedBody&, const Mesh&, const Assembly&, const Clamp&, const ModalBasis&,
                                    const std::vector<std::string>& exact_at = {}, int threads = 1,
                                    const StaticSolver* statics = nullptr);

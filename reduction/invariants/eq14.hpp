@@ -11,8 +11,8 @@ double alpha(int k);
 double sigma(int k);
 double one_minus_sigma(int k);
 
-/// Clamped-free Euler-Bernoulli shape of eq. 14 with A_k = 1 at x = z / L in [0, 1], in the form that keeps its digits
-/// for every k, and its derivatives with respect to x. |phi(k, 1)| = 2, sign as printed.
+/// Clamped-free Euler-Bernoulli shape of eq. 14 with A_k = 1 at x = z / L in [0, 1], and its derivatives with respect
+/// to x. The form keeps its digits for every k. |phi(k, 1)| = 2, sign as printed.
 double phi(int k, double x);
 double dphi(int k, double x);
 double ddphi(int k, double x);

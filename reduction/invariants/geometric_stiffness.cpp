@@ -58,8 +58,8 @@ void relieve(Statics& statics, const Mesh& mesh, const Assembly& assembly, const
   statics.U0 = left.expanded(pinned.loaded(left.reduced_loads(statics.F)));
 }
 
-/// Displacements of a held body. The digits that the factor of a slender body loses are those of its lowest modes:
-/// where the stiffness of the shapes is known, they are restored there instead of by a second solve.
+/// Displacements of a held body. The digits that the factor of a slender body loses are those of its lowest modes.
+/// Where the stiffness of the shapes is known, they are restored there instead of by a second solve.
 MatrixXd displacements(const Mesh& mesh, const Assembly& assembly, const Unknowns& left, const MatrixXd& F,
                        const MatrixXd& Phi, const GeometricOptions& options) {
   const MatrixXd f = left.reduced_loads(F);

@@ -23,16 +23,16 @@ struct GeometricOptions {
   const Eigen::MatrixXd* Ke = nullptr;
 };
 
-/// Geometric stiffness of shapes Phi (freedoms x n) from the prestress of unit loads: linear statics of the body held
-/// by `clamp`, then the second-order work of that stress on the shapes (README). Loads are dead: they keep their
-/// direction in the BRF, and a torque does work on the linear rotation S_theta q.
+/// Geometric stiffness of shapes Phi (freedoms x n) from the prestress of unit loads. Linear statics of the body held
+/// by `clamp` give the stress. The stiffness is the second-order work of that stress on the shapes (README). Loads are
+/// dead: they keep their direction in the BRF, and a torque does work on the linear rotation S_theta q.
 ///
 /// A body that nothing holds (mean axes) is in inertia relief: each load is balanced by the rigid acceleration it
-/// causes, so those of the frame's own accelerations are zero.
+/// causes. So the loads of the frame's own accelerations are zero.
 ///
 /// A marker of one node without rotations carries no torque: its `torque` is empty.
-/// @throws InputError when K was released, Phi is not over the freedoms of the mesh, a marker is no node set or its
-/// nodes lie on a line, or when the clamp leaves some rigid motions and not all six.
+/// @throws InputError when K was released or Phi is not over the freedoms of the mesh. Also when a marker is no node
+/// set or its nodes lie on a line, or the clamp leaves some rigid motions and not all six.
 /// @throws NumericalError when K is not positive definite.
 GeometricStiffness geometric_stiffness(const Mesh&, const Assembly&, const Clamp&, const Eigen::MatrixXd& Phi,
                                        const GeometricOptions& = {});

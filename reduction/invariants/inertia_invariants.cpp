@@ -47,9 +47,10 @@ void add_by_definition(ReducedBody& sum, double dm, const Vector3d& u0, const Ma
   }
 }
 
-/// The body over the coordinates p of q = R p. A point costs n^2 tilde matrices, so the invariants of a body with many
-/// coordinates are checked on a few combinations of all of them with signs at random, each scaled to unit mass: no
-/// entry can be wrong without being seen in one, unless two errors cancel.
+/// The body over the coordinates p of q = R p. A point costs n^2 tilde matrices. So the invariants of a body with many
+/// coordinates are checked on a few combinations of all of them. The combinations have signs at random, and each
+/// coordinate in them is scaled to unit mass. No entry can be wrong without being seen in one, unless two errors
+/// cancel.
 struct Sample {
   MatrixXd R;  // n x few
   ReducedBody body;

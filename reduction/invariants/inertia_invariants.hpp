@@ -6,15 +6,15 @@
 
 namespace flexboom {
 
-/// Reduced body of a mesh with a basis: invariants from the same mass points that make M, Ke = Phi^T K Phi, markers at
-/// every interface and the mean motion of every node set, lines of beams and surface of solids. Damping is zero. The
-/// result does not depend on the number of threads.
+/// Reduced body of a mesh with a basis: invariants, Ke = Phi^T K Phi, markers, lines of beams and the surface of
+/// solids. The invariants come from the same mass points that make M. Markers are every interface, and the mean motion
+/// of every node set. Damping is zero. The result does not depend on the number of threads.
 /// @throws InputError when the basis belongs to another mesh.
 ReducedBody reduce(const Mesh&, const Assembly&, const ModalBasis&, std::string name, int threads = 1);
 
-/// Every invariant by other routes: rigid motions T and M (m = t^T M t, Ct = T^T M Phi, Me = Phi^T M Phi, ...), and all
-/// of them by their definitions with a finer quadrature (the same one where elements integrate their mass
-/// approximately). `relative_error` is relative to the scale of the quantity (largest entry of its kind).
+/// Every invariant by other routes: rigid motions T and M (m = t^T M t, Ct = T^T M Phi, Me = Phi^T M Phi, ...). All of
+/// them also by their definitions with a finer quadrature, or the same one where elements integrate their mass
+/// approximately. `relative_error` is relative to the scale of the quantity (largest entry of its kind).
 std::vector<BodyCheck> check_invariants(const ReducedBody&, const Mesh&, const Assembly&, const ModalBasis&,
                                         double tolerance = 1e-12);
 

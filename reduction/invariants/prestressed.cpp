@@ -22,8 +22,8 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-/// Products sum dm a b^T (3 x 3) of fields of vectors over the body: rotations of the root, coordinates, then the
-/// acceleration c of the mass where the body stands as it was made, and the position u0.
+/// Products sum dm a b^T (3 x 3) of fields of vectors over the body. The fields are the rotations of the root and the
+/// coordinates. Then come the acceleration c of the mass where the body stands as it was made, and the position u0.
 class Moments {
  public:
   Moments(const ReducedBody& body, const SteadyMotion& motion, const std::vector<Vector3d>& turns)
@@ -54,9 +54,9 @@ struct Matrices {
   MatrixXd K, M;
 };
 
-/// Of rotations of the root and coordinates: second derivatives of sum dm (v . v) / 2, and of the potential
-/// V = q^T (Ke + Kg) q / 2 - sum dm (Omega x u)^2 / 2 + sum dm c . u, with u to second order in the rotation theta:
-/// theta x u0 + theta x (theta x u0) / 2 + S q + theta x S q.
+/// Matrices over rotations of the root and coordinates. M is the second derivatives of sum dm (v . v) / 2. K is those
+/// of the potential V = q^T (Ke + Kg) q / 2 - sum dm (Omega x u)^2 / 2 + sum dm c . u. u is taken to second order in
+/// the rotation theta: theta x u0 + theta x (theta x u0) / 2 + S q + theta x S q.
 Matrices matrices_of(const ReducedBody& body, const SteadyMotion& motion, const std::vector<Vector3d>& turns) {
   const Moments moments(body, motion, turns);
   const Index count = moments.freedoms, r = count - body.n();

@@ -20,7 +20,7 @@ struct PrestressedShapes {
 
 /// The elastic parts of the first modes of Ke + Kg + Kc in the frame that moves with the body. Kg is the geometric
 /// stiffness of the motion. Kc is what the spin does to mass that leaves its place. The root turns freely about
-/// `motion.turns`: an elastic part is the mode less the rotation of the root, so that shapes and joint together hold
+/// `motion.turns`. An elastic part is the mode less the rotation of the root, so that shapes and joint together hold
 /// the modes exactly. Coriolis terms are left out, and the body that carries the root does not give way.
 ///
 /// A mode that is a rigid rotation brings no shape, nor does one that depends on those before it: the next one does.

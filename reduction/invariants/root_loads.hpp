@@ -49,9 +49,9 @@ struct RootLoads {
 };
 
 /// What the carrier of a body exerts on it at its root, the BRF origin, so that it moves like this under the given
-/// marker loads: the rates of its momenta less the loads (first two rows of eqs. 7-9; the carrier feels the
-/// opposite). All rigid inertia is in it, so what the modes leave out is missing from q_ddot alone. Forces on markers
-/// act where the marker has gone: at position + S q.
+/// marker loads. It is the rates of the body's momenta less the loads (first two rows of eqs. 7-9). The carrier feels
+/// the opposite. All rigid inertia is in it, so what the modes leave out is missing from q_ddot alone. Forces on
+/// markers act where the marker has gone: at position + S q.
 /// @throws InputError when q, q_dot or q_ddot is neither empty nor of size n, or for a marker that does not exist.
 RootLoads root_loads(const ReducedBody&, const BodyMotion&, const std::vector<MarkerLoad>& = {});
 

@@ -30,9 +30,9 @@ struct BendingMode {
 /// `near` [rad/s]. Nothing where there is none, or above the cutoff sqrt(kappa G A / (rho I)).
 std::optional<BendingMode> bending_mode(const BendingBeam&, double near);
 
-/// Frequencies, Ct and Cr0 of modes of a uniform beam, clamped at one end, against closed forms: bending as
-/// bending_mode, tension and torsion by the wave equation. The errors are those of the mesh; above 1e-3 a check fails.
-/// Of any other model one line that says why closed forms are not applicable.
+/// Frequencies, Ct and Cr0 of modes of a uniform beam, clamped at one end, against closed forms. Bending is as
+/// bending_mode, tension and torsion are by the wave equation. The errors are those of the mesh; above 1e-3 a check
+/// fails. Of any other model one line that says why closed forms are not applicable.
 std::vector<BodyCheck> check_uniform_beam(const ReducedBody&, const Mesh&, const DofMap&, const Clamp&,
                                           const ModalBasis&);
 

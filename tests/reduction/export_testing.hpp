@@ -6,6 +6,7 @@
 #include "tests/reduction/messages.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -92,12 +93,16 @@ inline void add_random_stiffening(ReducedBody& body, unsigned seed) {
   }
 }
 
-/// A folder of its own for each test.
+/// A folder of its own for each test, in one of this process alone that is removed at the end.
 inline std::filesystem::path test_folder() {
+  struct Folders {
+    std::filesystem::path path =
+        std::filesystem::temp_directory_path() / ("flexboom_exports_" + std::to_string(::getpid()));
+    ~Folders() { std::filesystem::remove_all(path); }
+  };
+  static const Folders all;
   const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-  const std::filesystem::path folder =
-      std::filesystem::path(::testing::TempDir()) / (std::string(info->test_suite_name()) + "." + info->name());
-  std::filesystem::remove_all(folder);
+  const std::filesystem::path folder = all.path / (std::string(info->test_suite_name()) + "." + info->name());
   std::filesystem::create_directories(folder);
   return folder;
 }

@@ -148,6 +148,22 @@ TEST(ExportText, OtherCoordinatesAreTheSameBody) {
   }
 }
 
+/// Coordinates that are modes but for round-off, or the reverse of some, keep their signs.
+TEST(ExportText, ModalCoordinatesKeepTheSignsOfTheirOwn) {
+  test::Random random(12);
+  const Index n = bent().n();
+  for (const double share : {1e-9, 0.1}) {
+    const Eigen::VectorXd signs = random.matrix(n, 1);
+    const MatrixXd T = MatrixXd(signs.cwiseSign().asDiagonal()) + share * random.matrix(n, n);
+    const ReducedBody modal = with_unit_modal_mass(in_coordinates(bent(), T));
+    const MatrixXd turned = modal_coordinates(in_coordinates(bent(), T)).T;
+    for (Index k = 0; k < n; ++k) {
+      EXPECT_GT(turned(k, k), 0);
+      EXPECT_GT(modal.Ct.col(k).dot(bent().Ct.col(k)) * signs[k], 0) << k;
+    }
+  }
+}
+
 TEST(ExportMbdyn, FileHoldsWhatItSays) {
   const auto path = test::test_folder() / "bent.fem";
   const ExportOptions groups{{{"invariants", "groups"}}};

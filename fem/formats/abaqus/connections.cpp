@@ -103,8 +103,8 @@ void Connections::add_rigid(const Rigid& rigid) {
   }
 }
 
-// Each face shares its area among its nodes; quadratic ones give two thirds to the middles of the edges (weights must
-// be positive, and those of a uniform pressure are not).
+// Each face shares its area among its nodes. Quadratic faces give two thirds to the middles of the edges. Weights must
+// be positive, and those of a uniform pressure are not.
 std::vector<double> Connections::area_weights(const SurfaceParts& surface) const {
   std::vector<double> weights(surface.nodes.size(), surface.faces.empty() ? 1 : 0);
   for (const Face& face : surface.faces) {

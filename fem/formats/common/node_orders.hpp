@@ -8,8 +8,8 @@
 
 namespace flexboom {
 
-// In which order Gmsh and VTK list the nodes of a hexahedron of order p, as indices of our own lexicographic order:
-// node k of the format is our node order[k] = i + (p + 1) (j + (p + 1) k), i along xi fastest. Both have corners,
+// In which order Gmsh and VTK list the nodes of a hexahedron of order p, as indices of our own lexicographic order.
+// Node n of the format is our node order[n] = i + (p + 1) (j + (p + 1) k), i along xi fastest. Both have corners,
 // edges, faces, interior.
 
 /// Gmsh (reference manual, "Node ordering"): faces and interior are numbered like a quadrangle and a hexahedron of
@@ -19,9 +19,8 @@ std::vector<int> gmsh_hexahedron_order(int p);
 /// VTK_LAGRANGE_HEXAHEDRON of files before version 2.1 (vertical edges 04 15 37 26) and after it (04 15 26 37).
 std::vector<int> vtk_hexahedron_order(int p, bool before_2_1);
 
-/// Positions (3 x nodes) with those of "hex" elements of order above 2 taken to be equally spaced in the reference
-/// element, as Gmsh and VTK have them: returned are the positions of our Gauss-Lobatto-Legendre nodes on the same
-/// shapes.
+/// Positions (3 x nodes) of our Gauss-Lobatto-Legendre nodes, from those of Gmsh and VTK, on the same shapes. Gmsh and
+/// VTK space the nodes of "hex" elements of order above 2 equally in the reference element.
 Eigen::Matrix3Xd lobatto_from_equispaced(const Mesh&, const Eigen::Matrix3Xd&);
 
 /// The other way, for any values at the nodes (components x nodes).

@@ -9,7 +9,7 @@
 namespace flexboom {
 
 /// Reads a Gmsh file of version 2.2 or 4.1, ASCII or binary of either byte order. Physical groups of volumes become
-/// element sets and, one each, solid properties without material; groups of surfaces, lines and points become node sets
+/// element sets and, one each, solid properties without material. Groups of surfaces, lines and points become node sets
 /// of all nodes of their elements. A group without a name has its number for one. A file without any group has sets
 /// "volume_1", "surface_6", ... of its entities. Hexahedra of order 3 to 8 become "hex".
 /// @throws InputError with file:line:column, or file: byte in a binary file.

@@ -6,10 +6,10 @@
 
 namespace flexboom {
 
-/// Meshes a geometry (.step, .stp, .brep, .geo) with the program gmsh, which must be installed: tetrahedra of second
-/// order for STEP and BREP, what the file says for .geo. Lengths of STEP files are turned into metres; the others have
-/// no unit and are taken as they are.
-/// A script that starts programs or writes files is refused unless the options trust it.
+/// Meshes a geometry (.step, .stp, .brep, .geo) with the program gmsh, which must be installed. STEP and BREP files
+/// give tetrahedra of second order, .geo files what they say. Lengths of STEP files are turned into metres; the others
+/// have no unit and are taken as they are. A script that starts programs or writes files is refused unless the options
+/// trust it.
 /// @throws InputError when gmsh is missing (naming the package) or fails (with its last words).
 MeshFile mesh_with_gmsh(const std::filesystem::path&, const ReadOptions&);
 

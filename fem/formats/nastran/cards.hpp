@@ -9,9 +9,9 @@
 
 namespace flexboom::nastran {
 
-/// A card of the bulk data: "GRID" and what follows, continuations joined. Every line of a card has eight fields (two
-/// lines of large fields together), so field i of a card is where the manuals have it, without the name and the
-/// continuation marks.
+/// A card of the bulk data: "GRID" and what follows, continuations joined. Every line of a card has eight fields; two
+/// lines of large fields have eight together. So field i of a card is where the manuals have it, without the name and
+/// the continuation marks.
 struct Card {
   std::string name;  // upper case, without *
   std::string_view at;

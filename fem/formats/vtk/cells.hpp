@@ -19,15 +19,15 @@ struct VtkSolid {
 /// Type, and order of the points, of the cell that an element becomes.
 VtkSolid vtk_solid_of(const Element&);
 
-/// What a solid cell with so many points is read as (files before version 2.1 number Lagrange hexahedra otherwise);
-/// type 0 when it is no solid cell that there is an element for.
+/// What a solid cell with so many points is read as. Files before version 2.1 number Lagrange hexahedra otherwise. The
+/// type is 0 when it is no solid cell that there is an element for.
 VtkSolid vtk_solid(int type, size_t points, bool before_2_1);
 
 /// Whether a cell has fewer than three dimensions.
 bool is_vtk_carrier(int type);
 
-/// The name of a row of which a cell of a type has as many points and the same shape, that is not the row it stands for
-/// by itself: hex8-reduced of 12.
+/// Whether a cell of a type may be the element `row` of the table of elements: as many points and the same shape. That
+/// need not be the element it stands for by itself: type 12 may be hex8-reduced.
 bool may_be_row(int type, std::string_view row);
 
 /// Names of the fields that only we know.

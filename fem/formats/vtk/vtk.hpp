@@ -31,23 +31,23 @@ struct VtkGrid {
 void write_vtu(const std::filesystem::path&, const VtkGrid&);
 
 /// Points and cells of a mesh, point i at or near node i; no fields. Beams become lines, elements of order 1 and 2 the
-/// VTK cells of the same shape, "hex" of higher order Lagrange hexahedra (type 72), whose points are equally spaced in
-/// the reference element.
+/// VTK cells of the same shape. "hex" of higher order become Lagrange hexahedra (type 72), whose points are equally
+/// spaced in the reference element.
 VtkGrid vtk_grid(const Mesh&);
 
 /// Values at the points of vtk_grid(mesh) of a field with the values `nodal` (components x nodes) at the nodes.
 Eigen::MatrixXd vtk_point_values(const Mesh&, const Eigen::MatrixXd& nodal);
 
-/// Writes a mesh whole: node and element sets as fields "set:NAME" of points and cells (1: member), and as fields
-/// "flexboom:..." what VTK does not know: rows of the table of elements, properties, materials, beam sections,
-/// supports, bodies (those on one node as one), labels.
+/// Writes a mesh whole. Node and element sets are fields "set:NAME" of points and cells (1: member). What VTK does not
+/// know are fields "flexboom:...": element names, properties, materials, beam sections, supports, bodies (those on one
+/// node as one), labels.
 /// @throws InputError naming a connection or equation, which it cannot hold.
 void write_vtu(const std::filesystem::path&, const Mesh&);
 
 /// Reads a .vtu: ASCII, base64, appended, zlib; either byte order. Sets come from fields "set:NAME" and from integer
-/// fields of cells that other programs write: gmsh:physical, cell_tags, medit:ref, CellEntityIds, MaterialIDs and their
-/// likes, whose numbers are names; of cells that are no solids (triangles, lines, ...) the nodes make a node set.
-/// Without our own fields there are no materials, and lines are no beams.
+/// fields of cells that other programs write, whose numbers are names. Those are gmsh:physical, cell_tags, medit:ref,
+/// CellEntityIds, MaterialIDs and their likes. Of cells that are no solids (triangles, lines, ...) the nodes make a
+/// node set. Without our own fields there are no materials, and lines are no beams.
 /// @throws InputError with file:line:column.
 MeshFile read_vtu(std::string_view text, const std::string& file);
 
