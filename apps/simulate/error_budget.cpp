@@ -393,18 +393,20 @@ std::optional<ErrorBudget> budget_by_another(Scene& scene, Run& run, const RunHo
   if (!m.budget.measured) return m.budget;
   try {
     if (m.budget.has_stiffened) {
-      for (size_t i = 0; i < scene.bodies.size(); ++i) scene.bodies[i].stiffening = cheap->bodies[i].stiffening;
-      Run stiffened = run_once(scene, hooks);
+      Scene with_it = scene;
+      for (size_t i = 0; i < scene.bodies.size(); ++i) with_it.bodies[i].stiffening = cheap->bodies[i].stiffening;
+      Run stiffened = run_once(with_it, hooks);
       if (stiffened.motion.summary.interrupted) throw NumericalError("interrupted");
-      run = std::move(stiffened);
+      run = std::move(stiffened), scene = std::move(with_it);
     }
     Scene flown = as_flown(scene, run);
     Settling asked = settling_of(scene);
     asked.bearable = std::max(asked.bearable, 2 * m.budget.time);  // of the other: no step here mends that
     const Finding found{settle_time_error(flown, run, m.repeats.floors, asked, hooks, plan, &other)};
     scene.integrator_tolerance = flown.integrator_tolerance;
-    m.budget.time = m.enter(&OutputErrors::time, found,
-                            [](const OutputErrors& of_other) { return of_other.time * of_other.scale; });
+    const double most = m.enter(&OutputErrors::time, found,
+                                [](const OutputErrors& of_other) { return of_other.time * of_other.scale; });
+    if (!std::isnan(m.budget.time)) m.budget.time = most;
   } catch (const std::runtime_error& e) {
     m.missing("time", e.what());
     m.budget.time = unknown;

@@ -280,7 +280,8 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
   size_t enough = moved, too_few = std::min(too_few_, moved), next = moving_by(scene.tolerance / 10);
   if (too_few > 0) next = too_few + too_few / 8;
   double error = 0, error_of_fewer = 0;
-  const auto is_settled = [&] { return enough <= too_few + enough / 8; };  // a trial costs more than these would save
+  const auto hardly_any = [&] { return enough / 8; };  // a trial costs more than these would save
+  const auto is_settled = [&] { return enough <= too_few + hardly_any(); };
   const auto between = [&](size_t low) { return static_cast<size_t>(std::sqrt(static_cast<double>(low * enough))); };
   for (int i = 0; i < most_trials && !is_settled() && !hooks.stopped(); ++i) {
     const size_t count = std::min(next, enough - 1), if_too_few = between(count + 1);
@@ -292,7 +293,7 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
       enough = count, error = e;
       give_up_ahead(hooks);
       next = expected(count, e);
-      if (next >= enough) break;
+      if (next + hardly_any() >= enough) break;
       if (next < too_few) next = between(too_few);
     } else {
       too_few = count + 1, error_of_fewer = e;

@@ -36,10 +36,14 @@ std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const Ou
         reference == nullptr
             ? fmt::format("changed by {:.1e} at a tenth of the tolerance {:.0e}", error, flown.step_tolerance())
             : fmt::format("differs by {:.1e} from relative coordinates by {}", error, reference->motion.summary.method);
+    if (reference != nullptr) try {
+        next = finer();
+      } catch (const NumericalError&) {
+        return differences;  // those of the run are known
+      }
+    if (next.motion.summary.interrupted) throw NumericalError("interrupted");
     plan.push_back(
         fmt::format("{}{}{}; the integrator gets {:.0e}", of_time, energies, against, tight.step_tolerance()));
-    if (reference != nullptr) next = finer();
-    if (next.motion.summary.interrupted) throw NumericalError("interrupted");
     run = std::move(next);
     flown = tight;
   }
