@@ -1,3 +1,4 @@
+#include "apps/base/toml_words.hpp"
 #include "apps/commands/commands.hpp"
 #include "apps/commands/terminal_line.hpp"
 #include "apps/results/report.hpp"
@@ -7,6 +8,7 @@
 #include "fem/base/files.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -16,6 +18,8 @@
 #include <cmath>
 #include <csignal>
 #include <sstream>
+#include <string_view>
+#include <vector>
 
 namespace flexboom {
 

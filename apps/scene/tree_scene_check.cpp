@@ -9,6 +9,7 @@
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>

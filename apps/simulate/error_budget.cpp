@@ -12,12 +12,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -314,9 +312,9 @@ double linearisation_error(Scene& scene, Scene& flown, Run& run, Measuring& m) {
 
 namespace {
 
-/// Of a run, from repeats of it.
+/// Of a run, from repeats of it. `digits`: what is said of those that its integrator gets.
 ErrorBudget budget_by_repeats(Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan,
-                              const StillKinds& still) {
+                              std::vector<std::string>& digits, const StillKinds& still) {
   Measuring m{{hooks, floors_of(scene, run.bodies)}, plan};
   ErrorBudget& budget = m.budget;
   Scene flown = as_flown(scene, run);
@@ -355,7 +353,7 @@ ErrorBudget budget_by_repeats(Scene& scene, Run& run, const RunHooks& hooks, std
     const Settling asked = settling_of(scene);
     constexpr double of_tighter = 1.15;  // a flight with a digit more has a tenth of the error left
     return m.enter(&OutputErrors::time,
-                   {settle_time_error(flown, run, m.repeats.floors, asked, hooks, m.plan), of_tighter});
+                   {settle_time_error(flown, run, m.repeats.floors, asked, hooks, digits), of_tighter});
   });
   scene.integrator_tolerance = flown.integrator_tolerance;
   look_beyond();
@@ -386,10 +384,9 @@ std::optional<ErrorBudget> budget_by_another(Scene& scene, Run& run, const RunHo
   if (other.motion.summary.interrupted) return {};
   plan.push_back(fmt::format("error budget: repeats are those of a run in relative coordinates by {}, which cost less",
                              other.motion.summary.method));
-  std::vector<std::string> words;
-  Measuring m{{hooks, floors_of(scene, run.bodies)}, plan, budget_by_repeats(*cheap, other, hooks, words, still)};
-  std::erase_if(words, [](const std::string& line) { return line.starts_with(of_time); });  // the other run's tolerance
-  plan.insert(plan.end(), words.begin(), words.end());
+  std::vector<std::string> of_the_other;  // its digits are nobody's concern
+  Measuring m{
+      {hooks, floors_of(scene, run.bodies)}, plan, budget_by_repeats(*cheap, other, hooks, plan, of_the_other, still)};
   if (!m.budget.measured) return m.budget;
   try {
     if (m.budget.has_stiffened) {
@@ -421,7 +418,7 @@ std::optional<ErrorBudget> budget_by_another(Scene& scene, Run& run, const RunHo
 ErrorBudget measure_budget(Scene& scene, Run& run, const RunHooks& hooks, std::vector<std::string>& plan,
                            const StillKinds& still) {
   if (std::optional<ErrorBudget> budget = budget_by_another(scene, run, hooks, plan, still)) return *budget;
-  return budget_by_repeats(scene, run, hooks, plan, still);
+  return budget_by_repeats(scene, run, hooks, plan, plan, still);
 }
 
 }  // namespace flexboom

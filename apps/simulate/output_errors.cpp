@@ -4,6 +4,7 @@
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <array>
@@ -181,7 +182,7 @@ std::string description(const OutputErrors& o) {
 
 double OutputErrors::known() const {
   OutputErrors o = *this;
-  for (const auto& [name, part] : error_parts)
+  for (const auto& [title, part] : error_parts)
     if (std::isnan(o.*part)) o.*part = 0;
   return o.total();
 }

@@ -171,7 +171,7 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
     try {
       settle_time_error(with_few, few, floors_of(scene, few.bodies), asked, hooks, plan);
     } catch (const NumericalError& e) {  // no more digits can be had: those that were reached count
-      plan.push_back(fmt::format("{}no tighter than {:.0e}: {}", of_time, with_few.step_tolerance(), e.what()));
+      plan.push_back(fmt::format("time integration: no tighter than {:.0e}: {}", with_few.step_tolerance(), e.what()));
     }
     if (with_few.integrator_tolerance != scene.integrator_tolerance) give_up_ahead(hooks);
     scene.integrator_tolerance = with_few.integrator_tolerance;

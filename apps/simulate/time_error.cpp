@@ -43,7 +43,7 @@ std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const Ou
       }
     if (next.motion.summary.interrupted) throw NumericalError("interrupted");
     plan.push_back(
-        fmt::format("{}{}{}; the integrator gets {:.0e}", of_time, energies, against, tight.step_tolerance()));
+        fmt::format("time integration: {}{}; the integrator gets {:.0e}", energies, against, tight.step_tolerance()));
     run = std::move(next);
     flown = tight;
   }

@@ -4,13 +4,9 @@
 
 #include <limits>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace flexboom {
-
-/// How lines of the plan begin that say of a tighter integrator.
-inline constexpr std::string_view of_time = "time integration: ";
 
 /// What settle_time_error is content with.
 struct Settling {

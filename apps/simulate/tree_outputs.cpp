@@ -1,6 +1,7 @@
 // Outputs of a scene: columns of trajectory.csv, lines of the plan.
 
 #include "apps/base/deflection.hpp"
+#include "apps/scene/scene_keys.hpp"
 #include "apps/scene/scene_orbit.hpp"
 #include "apps/simulate/tree_flight.hpp"
 #include "dynamics/numerics/rotation.hpp"
