@@ -1,3 +1,4 @@
+#include "apps/base/usage.hpp"
 #include "apps/base/version.hpp"
 #include "apps/commands/commands.hpp"
 #include "fem/base/blas_threads.hpp"
@@ -316,6 +317,9 @@ int main(int argc, char** argv) {
 #endif
   try {
     return run_line(argc, argv);
+  } catch (const UsageError& e) {
+    print_note(fmt::format("error: {}", e.what()));
+    return exit_usage;
   } catch (const InputError& e) {
     print_note(fmt::format("error: {}", e.what()));
     return exit_input;

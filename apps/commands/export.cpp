@@ -1,4 +1,5 @@
 #include "apps/commands/commands.hpp"
+#include "apps/base/usage.hpp"
 #include "fem/base/check.hpp"
 #include "reduction/body_file/body_file.hpp"
 #include "reduction/exports/exports.hpp"
@@ -13,7 +14,7 @@ int export_command(const ExportArguments& a, const CommonOptions& common) {
   ExportOptions options;
   for (const std::string& text : a.settings) {
     const size_t equals = text.find('=');
-    require(equals != std::string::npos, fmt::format("--set: '{}' must be NAME=VALUE", text));
+    require_usage(equals != std::string::npos, fmt::format("--set: '{}' must be NAME=VALUE", text));
     options.settings[text.substr(0, equals)] = text.substr(equals + 1);
   }
   const ReducedBody body = read_body_file(a.body);

@@ -1,4 +1,5 @@
 #include "apps/base/toml_words.hpp"
+#include "apps/base/usage.hpp"
 #include "apps/commands/commands.hpp"
 #include "apps/commands/terminal_line.hpp"
 #include "apps/results/report.hpp"
@@ -86,7 +87,7 @@ void override_modes(Scene& scene, const std::string& text) {
   int n = 0;
   if (text != "auto") {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), n);
-    require(error == std::errc() && end == text.data() + text.size() && n >= 0,
+    require_usage(error == std::errc() && end == text.data() + text.size() && n >= 0,
             fmt::format("--modes: '{}' is neither a number of modes nor auto", text));
   }
   require(std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyScene& b) { return b.is_boom(); }),
@@ -287,7 +288,7 @@ nlohmann::ordered_json checked(const std::string& name) {
 }  // namespace
 
 int run_command(const RunArguments& a, const CommonOptions& common) {
-  require(!std::isnan(a.checkpoint), "--checkpoint: is not a number of seconds");
+  require_usage(!std::isnan(a.checkpoint), "--checkpoint: is not a number of seconds");
   const Scene scene = scene_of(a, common.quiet);
   const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results") / scene.name : common.out;
   ResultsFolder results(folder, scene, builtin_scene(a.scene) ? "" : a.scene);

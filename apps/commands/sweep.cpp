@@ -1,4 +1,5 @@
 #include "apps/sweep/sweep.hpp"
+#include "apps/base/usage.hpp"
 #include "apps/commands/commands.hpp"
 #include "apps/commands/terminal_line.hpp"
 #include "fem/base/check.hpp"
@@ -28,7 +29,7 @@ Shard shard_of(const std::string& text) {
   const auto first_read = std::from_chars(text.data(), last, shard.part);
   const bool has_slash = first_read.ec == std::errc() && first_read.ptr != last && *first_read.ptr == '/';
   const auto second_read = std::from_chars(has_slash ? first_read.ptr + 1 : last, last, shard.of);
-  require(has_slash && second_read.ec == std::errc() && second_read.ptr == last && shard.part >= 1 &&
+  require_usage(has_slash && second_read.ec == std::errc() && second_read.ptr == last && shard.part >= 1 &&
               shard.part <= shard.of,
           fmt::format("--shard {}: is written i/n, i from 1 to n", text));
   return shard;
@@ -54,7 +55,7 @@ class SweepProgress {
 };
 
 SweepRequest request_of(const SweepArguments& a, const CommonOptions& common) {
-  require(!a.scene.empty(), "sweep needs a SCENE, or --merge DIR...");
+  require_usage(!a.scene.empty(), "sweep needs a SCENE, or --merge DIR...");
   SweepRequest r;
   r.scene = a.scene;
   r.design = {a.vary, a.runs, a.sample, a.seed, a.indices};
@@ -92,8 +93,8 @@ int sweep_command(const SweepArguments& a, const CommonOptions& common) {
   SweepEnd end;
   std::filesystem::path folder = common.out;
   if (!a.merge.empty()) {
-    require(!folder.empty(), "--merge needs --out DIR");
-    require(a.scene.empty() && a.vary.empty(), "--merge takes folders of shards, no SCENE and no --vary");
+    require_usage(!folder.empty(), "--merge needs --out DIR");
+    require_usage(a.scene.empty() && a.vary.empty(), "--merge takes folders of shards, no SCENE and no --vary");
     end = merge_sweeps(a.merge, folder, a.report);
   } else {
     const SweepRequest request = request_of(a, common);

@@ -1,5 +1,6 @@
 #include "apps/model/model.hpp"
 
+#include "apps/base/usage.hpp"
 #include "apps/model/prepared_body.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/text_reader.hpp"
@@ -69,7 +70,7 @@ Model file_model(const std::filesystem::path& path, const ModelOptions& options)
 
 Material parse_material(const std::string& text) {
   const std::optional<std::vector<double>> values = to_reals(text);
-  require(values && values->size() == 3, fmt::format("--material: '{}' is not E,nu,rho, e.g. 67e9,0.33,2840", text));
+  require_usage(values && values->size() == 3, fmt::format("--material: '{}' is not E,nu,rho, e.g. 67e9,0.33,2840", text));
   const Material m{(*values)[0], (*values)[1], (*values)[2]};
   m.validate();
   return m;

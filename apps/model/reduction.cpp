@@ -1,6 +1,7 @@
 #include "apps/model/reduction.hpp"
 
 #include "apps/base/axis.hpp"
+#include "apps/base/usage.hpp"
 #include "apps/base/version.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
@@ -36,7 +37,7 @@ std::pair<std::string, std::string> split(const std::string& text, char at) {
 /// Numbers between commas. @throws InputError naming the option.
 std::vector<double> numbers(const std::string& option, const std::string& text) {
   const std::optional<std::vector<double>> values = to_reals(text);
-  require(values.has_value(), fmt::format("{}: '{}' is not a number, or numbers between commas", option, text));
+  require_usage(values.has_value(), fmt::format("{}: '{}' is not a number, or numbers between commas", option, text));
   return *values;
 }
 
@@ -76,7 +77,7 @@ SteadyMotion steady_motion(const ReduceArguments& a, const std::optional<SteadyM
   if (!a.turns.empty()) motion.turns.clear();
   for (const std::string& text : a.turns) {
     const auto axis = axis_of(text);
-    require(axis.has_value(),
+    require_usage(axis.has_value(),
             fmt::format("--turns: '{}' is no axis; there are x, y, z, and X,Y,Z of a direction", text));
     motion.turns.push_back(*axis);
   }
@@ -130,7 +131,7 @@ std::vector<int> selection(const ReducedBody& body, const std::string& text) {
   if (rule == "band" && values.size() == 2) return modes_in_band(body, values[0], values[1]);
   if (rule == "mass" && values.size() == 1) return modes_by_effective_mass(body, values[0], {0, 1, 2});
   if (rule == "completeness" && values.size() == 1) return modes_by_completeness(body, values[0]);
-  throw InputError(
+  throw UsageError(
       fmt::format("--select: '{}' is not understood; there are list:1,3 band:LOW,HIGH mass:SHARE "
                   "completeness:SHARE output:SET.uy,SHARE",
                   text));
@@ -212,7 +213,7 @@ DampingRule parse_damping(const std::string& text) {
   const std::vector<double> values = rest.empty() ? std::vector<double>{} : numbers("--damping", rest);
   if ((rule == "modal" || rule == "loss-factor") && values.size() == 1) return {rule, values[0], 0, 0};
   if (rule == "rayleigh" && values.size() == 2) return {rule, 0, values[0], values[1]};
-  throw InputError(fmt::format(
+  throw UsageError(fmt::format(
       "--damping: '{}' is not understood; there are none, modal:ZETA, loss-factor:ETA, rayleigh:ALPHA,BETA", text));
 }
 

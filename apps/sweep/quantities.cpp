@@ -1,6 +1,7 @@
 #include "apps/sweep/quantities.hpp"
 
 #include "apps/base/toml_reader.hpp"
+#include "apps/base/usage.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
@@ -65,23 +66,23 @@ Quantity quantity_of(const std::string& text) {
   const std::string usage =
       fmt::format("--quantity {}: is written COLUMN:max, COLUMN:rms, COLUMN:final or settle:COLUMN:FRACTION", text);
   const size_t last = text.rfind(':');
-  require(last != std::string::npos && last > 0 && last + 1 < text.size(), usage);
+  require_usage(last != std::string::npos && last > 0 && last + 1 < text.size(), usage);
   const std::string behind = text.substr(last + 1);
   Quantity q;
   q.name = text;
   if (!text.starts_with("settle:")) {
     const auto* const kind = std::find(kinds.begin(), kinds.end(), behind);
-    require(kind != kinds.end(), usage);
+    require_usage(kind != kinds.end(), usage);
     q.output = text.substr(0, last);
     q.kind = static_cast<Quantity::Kind>(kind - kinds.begin());
     return q;
   }
   const size_t begin = std::string_view("settle:").size();
-  require(last > begin, usage);
+  require_usage(last > begin, usage);
   q.output = text.substr(begin, last - begin);
   q.kind = Quantity::Kind::settle;
   const auto [end, error] = std::from_chars(behind.data(), behind.data() + behind.size(), q.fraction);
-  require(error == std::errc() && end == behind.data() + behind.size() && q.fraction > 0 && q.fraction < 1,
+  require_usage(error == std::errc() && end == behind.data() + behind.size() && q.fraction > 0 && q.fraction < 1,
           fmt::format("--quantity {}: the fraction '{}' must be a number between 0 and 1", text, behind));
   return q;
 }

@@ -1,5 +1,6 @@
 #include "apps/sweep/scene_source.hpp"
 
+#include "apps/base/usage.hpp"
 #include "apps/scene/scene_keys.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/files.hpp"
@@ -189,7 +190,7 @@ void take_body_file(Value& body, const std::filesystem::path& folder, Sha256& di
 }  // namespace
 
 KeyVariant key_variant(std::string_view text) {
-  require(!text.empty(), "--vary: a value is empty");
+  require_usage(!text.empty(), "--vary: a value is empty");
   KeyVariant variant;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), variant.number);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(variant.number))

@@ -1,5 +1,6 @@
 #include "apps/sweep/variation.hpp"
 
+#include "apps/base/usage.hpp"
 #include "apps/sweep/indices.hpp"
 #include "fem/base/check.hpp"
 
@@ -28,18 +29,18 @@ std::vector<std::string> split_at(std::string_view text, char sign) {
 
 double spec_number(const std::string& of, const std::string& text) {
   const KeyVariant v = text.empty() ? KeyVariant{0, "nothing"} : key_variant(text);
-  require(v.word.empty(), fmt::format("--vary {}: '{}' is no number", of, text));
+  require_usage(v.word.empty(), fmt::format("--vary {}: '{}' is no number", of, text));
   return v.number;
 }
 
 /// lin:a:b:n and log:a:b:n. Both ends are met exactly.
 void fill_range(const std::string& of, const std::vector<std::string>& parts, Variation& v) {
-  require(parts.size() == 4, fmt::format("--vary {}: is written {}:FIRST:LAST:COUNT", of, parts[0]));
+  require_usage(parts.size() == 4, fmt::format("--vary {}: is written {}:FIRST:LAST:COUNT", of, parts[0]));
   const double first = spec_number(of, parts[1]), last = spec_number(of, parts[2]), count = spec_number(of, parts[3]);
-  require(count >= 2 && count <= static_cast<double>(most_runs) && count == std::trunc(count),
+  require_usage(count >= 2 && count <= static_cast<double>(most_runs) && count == std::trunc(count),
           fmt::format("--vary {}: the count is {}; it must be a whole number from 2", of, parts[3]));
   const bool log = parts[0] == "log";
-  require(!log || (first > 0 && last > 0), fmt::format("--vary {}: both ends of log must be positive", of));
+  require_usage(!log || (first > 0 && last > 0), fmt::format("--vary {}: both ends of log must be positive", of));
   const auto n = static_cast<size_t>(count);
   for (size_t i = 0; i < n; ++i) {
     const double share = static_cast<double>(i) / static_cast<double>(n - 1);
@@ -50,11 +51,11 @@ void fill_range(const std::string& of, const std::vector<std::string>& parts, Va
 
 void fill_distribution(const std::string& of, const std::vector<std::string>& parts, Variation& v) {
   const bool normal = parts[0] == "normal";
-  require(parts.size() == 3, fmt::format("--vary {}: is written {}", of,
+  require_usage(parts.size() == 3, fmt::format("--vary {}: is written {}", of,
                                          normal ? "normal:MEAN:STANDARD_DEVIATION" : "uniform:LOWEST:HIGHEST"));
   v.kind = normal ? Variation::Kind::normal : Variation::Kind::uniform;
   v.a = spec_number(of, parts[1]), v.b = spec_number(of, parts[2]);
-  require(normal ? v.b >= 0 : v.a <= v.b,
+  require_usage(normal ? v.b >= 0 : v.a <= v.b,
           fmt::format("--vary {}: {}", of,
                       normal ? "the standard deviation is negative" : "the lowest value is above the highest"));
 }
@@ -62,7 +63,7 @@ void fill_distribution(const std::string& of, const std::vector<std::string>& pa
 Sampling sampling_of(const SweepDesign& design, bool all_lists) {
   if (design.sample.empty()) return design.indices ? Sampling::sobol : all_lists ? Sampling::grid : Sampling::random;
   const auto* const name = std::find(sampling_names.begin(), sampling_names.end(), design.sample);
-  require(name != sampling_names.end(), "--sample " + toml_reader::not_among(design.sample, sampling_names));
+  require_usage(name != sampling_names.end(), "--sample " + toml_reader::not_among(design.sample, sampling_names));
   return static_cast<Sampling>(name - sampling_names.begin());
 }
 
@@ -124,7 +125,7 @@ KeyVariant Variation::at(double u) const {
 
 Variation variation_of(const std::string& text) {
   const size_t sign = text.find('=');
-  require(sign != std::string::npos && sign > 0 && sign + 1 < text.size(),
+  require_usage(sign != std::string::npos && sign > 0 && sign + 1 < text.size(),
           fmt::format("--vary {}: is written KEY=SPEC, for example hub.mass=8,9,10", text));
   Variation v;
   v.name = text.substr(0, sign);
@@ -140,12 +141,12 @@ Variation variation_of(const std::string& text) {
     fill_distribution(v.name, parts, v);
   } else {
     const std::vector<std::string_view> words = {"lin", "log", "normal", "uniform"};
-    require(parts.size() == 1 || toml_reader::nearest(parts[0], words).empty(),
+    require_usage(parts.size() == 1 || toml_reader::nearest(parts[0], words).empty(),
             fmt::format("--vary {}: {}", v.name, toml_reader::not_among(parts[0], words)));
     for (const std::string& entry : split_at(spec, ',')) v.list.push_back(key_variant(entry));
   }
   for (const KeyVariant& value : v.list)
-    require(!v.factor || value.word.empty(), fmt::format("--vary {}: '{}' is no number", v.name, value.word));
+    require_usage(!v.factor || value.word.empty(), fmt::format("--vary {}: '{}' is no number", v.name, value.word));
   return v;
 }
 
@@ -154,17 +155,17 @@ void apply(const Variation& v, const KeyVariant& value, SceneSource& scene) {
 }
 
 SweepValues::SweepValues(const SweepDesign& design) {
-  require(!design.vary.empty(), "a sweep needs --vary KEY=SPEC");
+  require_usage(!design.vary.empty(), "a sweep needs --vary KEY=SPEC");
   for (const std::string& text : design.vary) variations_.push_back(variation_of(text));
   for (size_t i = 0; i < variations_.size(); ++i)
     if (variations_[i].varies()) varying_.push_back(i);
   const auto is_list = [](const Variation& v) { return v.kind == Variation::Kind::list; };
   const bool all_lists = std::all_of(variations_.begin(), variations_.end(), is_list);
   sampling_ = sampling_of(design, all_lists);
-  require(!design.indices || sampling_ == Sampling::sobol, "--indices needs --sample sobol");
+  require_usage(!design.indices || sampling_ == Sampling::sobol, "--indices needs --sample sobol");
   if (sampling_ == Sampling::grid) {
-    require(all_lists, "--sample grid takes lists only: a,b,c or lin:a:b:n or log:a:b:n; give -n N to draw runs");
-    require(!design.n,
+    require_usage(all_lists, "--sample grid takes lists only: a,b,c or lin:a:b:n or log:a:b:n; give -n N to draw runs");
+    require_usage(!design.n,
             "-n: a grid has as many runs as its lists have combinations; to draw from the lists, give "
             "--sample random, lhs or sobol");
     runs_ = 1;
@@ -174,11 +175,11 @@ SweepValues::SweepValues(const SweepDesign& design) {
     }
     return;
   }
-  require(design.n.has_value() && *design.n > 0 && *design.n <= most_runs,
+  require_usage(design.n.has_value() && *design.n > 0 && *design.n <= most_runs,
           fmt::format("--sample {} needs the number of runs, -n from 1 to {}",
                       sampling_names[static_cast<size_t>(sampling_)], most_runs));
   const size_t d = design.indices ? varying_.size() : variations_.size();
-  require(d > 0, "--indices needs a key that takes more than one value");
+  require_usage(d > 0, "--indices needs a key that takes more than one value");
   if (design.indices) base_points_ = *design.n;
   runs_ = *design.n * (design.indices ? d + 2 : 1);
   require(runs_ <= most_runs, fmt::format("{} runs are more than {}", runs_, most_runs));

@@ -115,6 +115,17 @@ class Usage(Case):
         self.assert_usage("run", "sport", "--duration", "long", words="long")
         self.assert_usage("run", "sport", "--threads", "0", words="threads")
 
+    def test_values_of_another_form(self):
+        for option, value in (("--vary", "hub.mass"), ("--vary", "hub.mass=lin:1:2"), ("--vary", "hub.mass*=a,b")):
+            self.assert_usage("sweep", "sport", option, value, words=option)
+        for option, value in (("--sample", "often"), ("--quantity", "tip"), ("--shard", "3/2"), ("--shard", "half")):
+            self.assert_usage("sweep", "sport", "--vary", "hub.mass=8,9", option, value, words=option)
+        self.assert_usage("sweep", "sport", words="--vary")
+        self.assert_usage("run", "sport", "--modes", "few", words="--modes")
+        self.assert_usage("modes", BOOM4, "--material", "67e9,0.33", words="--material")
+        self.assert_usage("reduce", BOOM4, "-o", "boom.h5", "--damping", "modal", words="--damping")
+        self.assert_usage("reduce", BOOM4, "-o", "boom.h5", "--select", "best", words="--select")
+
     def test_free_and_clamp_exclude_each_other(self):
         self.assert_usage("modes", BOOM4, "--free", "--clamp", "root", words="--clamp")
 
