@@ -88,7 +88,7 @@ void override_modes(Scene& scene, const std::string& text) {
   if (text != "auto") {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), n);
     require_usage(error == std::errc() && end == text.data() + text.size() && n >= 0,
-            fmt::format("--modes: '{}' is neither a number of modes nor auto", text));
+                  fmt::format("--modes: '{}' is neither a number of modes nor auto", text));
   }
   require(std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyScene& b) { return b.is_boom(); }),
           "--modes: this scene has no boom made from its geometry");

@@ -30,8 +30,8 @@ Shard shard_of(const std::string& text) {
   const bool has_slash = first_read.ec == std::errc() && first_read.ptr != last && *first_read.ptr == '/';
   const auto second_read = std::from_chars(has_slash ? first_read.ptr + 1 : last, last, shard.of);
   require_usage(has_slash && second_read.ec == std::errc() && second_read.ptr == last && shard.part >= 1 &&
-              shard.part <= shard.of,
-          fmt::format("--shard {}: is written i/n, i from 1 to n", text));
+                    shard.part <= shard.of,
+                fmt::format("--shard {}: is written i/n, i from 1 to n", text));
   return shard;
 }
 

@@ -70,7 +70,8 @@ Model file_model(const std::filesystem::path& path, const ModelOptions& options)
 
 Material parse_material(const std::string& text) {
   const std::optional<std::vector<double>> values = to_reals(text);
-  require_usage(values && values->size() == 3, fmt::format("--material: '{}' is not E,nu,rho, e.g. 67e9,0.33,2840", text));
+  require_usage(values && values->size() == 3,
+                fmt::format("--material: '{}' is not E,nu,rho, e.g. 67e9,0.33,2840", text));
   const Material m{(*values)[0], (*values)[1], (*values)[2]};
   m.validate();
   return m;

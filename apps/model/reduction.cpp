@@ -78,7 +78,7 @@ SteadyMotion steady_motion(const ReduceArguments& a, const std::optional<SteadyM
   for (const std::string& text : a.turns) {
     const auto axis = axis_of(text);
     require_usage(axis.has_value(),
-            fmt::format("--turns: '{}' is no axis; there are x, y, z, and X,Y,Z of a direction", text));
+                  fmt::format("--turns: '{}' is no axis; there are x, y, z, and X,Y,Z of a direction", text));
     motion.turns.push_back(*axis);
   }
   return motion;

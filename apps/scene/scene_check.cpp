@@ -240,6 +240,12 @@ void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
     if (joint_type(j.kind).scalars == 1)
       look("joint " + j.name, j.mechanism, j.start.empty() ? j.mechanism.rest : j.start[0],
            j.kind == JointKind::slider ? "m" : "rad");
+  for (const BodyScene& b : scene.bodies) {
+    const double ratio = b.damping.name == "loss-factor" ? b.damping.value / 2 : b.damping.value;
+    if (ratio > 1)  // of critical damping
+      warnings.push_back(
+          fmt::format("body {}: its damping ratio is {:g}, with which nothing vibrates; 5 % is 0.05", b.name, ratio));
+  }
   for (const BodyScene& b : scene.bodies)
     if (b.reduced)
       for (const BodyCheck& c : b.reduced->certificate)

@@ -373,7 +373,10 @@ void scene_keys_of_file(Archive& a, Scene& s) {
   a.table({"orbit", "", "Orbit of the reference point. Without the table there is none."}, s.orbit, orbit_keys);
   a.tables({"bodies", "", "Bodies: booms of beams or solids."}, s.bodies, body_keys);
   a.tables({"joints", "", "Joints. Each body hangs on one."}, s.joints, joint_keys);
-  a.tables({"springs", "", "Line springs between two places."}, s.springs, spring_keys);
+  a.tables(
+      {"springs", "",
+       "Line springs between two places. Ends that start at one point are a fault where `free_length` is not zero."},
+      s.springs, spring_keys);
   a.tables({"loads", "", "Forces and torques."}, s.loads, load_keys);
   a.tables({"wheels", "", "Reaction wheels."}, s.wheels, wheel_keys);
   a.tables({"turns", "", "Turns from rest to rest by wheels, one after another."}, s.turns, turn_keys);

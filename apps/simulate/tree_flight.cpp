@@ -213,6 +213,21 @@ Vector3d mass_centre(const Tree& tree, const TreeState& state) {
   return moment / mass;
 }
 
+namespace {
+
+/// @throws InputError where a pressed spring pushes nowhere.
+void check_springs(const Tree& tree, const VectorXd& y) {
+  for (const SpringDamper& spring : tree.scene().springs) {
+    const double length = (tree.motion(0, y, spring.b).position - tree.motion(0, y, spring.a).position).norm();
+    require(length > 1e-12 * spring.free_length || spring.stiffness * spring.free_length == 0,
+            fmt::format("spring \"{}\": both ends start at the same point, where a free length of {:g} m has no "
+                        "direction; place them apart",
+                        spring.name, spring.free_length));
+  }
+}
+
+}  // namespace
+
 VectorXd first_state(const Scene& scene, const Tree& tree) {
   if (scene.from) return scene.from->values(state_names(tree));
   TreeState start = start_state(scene, tree);
@@ -221,7 +236,9 @@ VectorXd first_state(const Scene& scene, const Tree& tree) {
     for (size_t i = 0; i < scene.joints.size(); ++i)
       if (scene.joints[i].a.body.empty()) start.joints[i].position -= scene.joints[i].a.axes().transpose() * centre;
   }
-  return tree.pack(start);
+  VectorXd y = tree.pack(start);
+  check_springs(tree, y);
+  return y;
 }
 
 std::vector<std::string> joint_names(const Scene& scene) {

@@ -83,7 +83,7 @@ Quantity quantity_of(const std::string& text) {
   q.kind = Quantity::Kind::settle;
   const auto [end, error] = std::from_chars(behind.data(), behind.data() + behind.size(), q.fraction);
   require_usage(error == std::errc() && end == behind.data() + behind.size() && q.fraction > 0 && q.fraction < 1,
-          fmt::format("--quantity {}: the fraction '{}' must be a number between 0 and 1", text, behind));
+                fmt::format("--quantity {}: the fraction '{}' must be a number between 0 and 1", text, behind));
   return q;
 }
 

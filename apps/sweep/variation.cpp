@@ -38,7 +38,7 @@ void fill_range(const std::string& of, const std::vector<std::string>& parts, Va
   require_usage(parts.size() == 4, fmt::format("--vary {}: is written {}:FIRST:LAST:COUNT", of, parts[0]));
   const double first = spec_number(of, parts[1]), last = spec_number(of, parts[2]), count = spec_number(of, parts[3]);
   require_usage(count >= 2 && count <= static_cast<double>(most_runs) && count == std::trunc(count),
-          fmt::format("--vary {}: the count is {}; it must be a whole number from 2", of, parts[3]));
+                fmt::format("--vary {}: the count is {}; it must be a whole number from 2", of, parts[3]));
   const bool log = parts[0] == "log";
   require_usage(!log || (first > 0 && last > 0), fmt::format("--vary {}: both ends of log must be positive", of));
   const auto n = static_cast<size_t>(count);
@@ -52,12 +52,12 @@ void fill_range(const std::string& of, const std::vector<std::string>& parts, Va
 void fill_distribution(const std::string& of, const std::vector<std::string>& parts, Variation& v) {
   const bool normal = parts[0] == "normal";
   require_usage(parts.size() == 3, fmt::format("--vary {}: is written {}", of,
-                                         normal ? "normal:MEAN:STANDARD_DEVIATION" : "uniform:LOWEST:HIGHEST"));
+                                               normal ? "normal:MEAN:STANDARD_DEVIATION" : "uniform:LOWEST:HIGHEST"));
   v.kind = normal ? Variation::Kind::normal : Variation::Kind::uniform;
   v.a = spec_number(of, parts[1]), v.b = spec_number(of, parts[2]);
   require_usage(normal ? v.b >= 0 : v.a <= v.b,
-          fmt::format("--vary {}: {}", of,
-                      normal ? "the standard deviation is negative" : "the lowest value is above the highest"));
+                fmt::format("--vary {}: {}", of,
+                            normal ? "the standard deviation is negative" : "the lowest value is above the highest"));
 }
 
 Sampling sampling_of(const SweepDesign& design, bool all_lists) {
@@ -126,7 +126,7 @@ KeyVariant Variation::at(double u) const {
 Variation variation_of(const std::string& text) {
   const size_t sign = text.find('=');
   require_usage(sign != std::string::npos && sign > 0 && sign + 1 < text.size(),
-          fmt::format("--vary {}: is written KEY=SPEC, for example hub.mass=8,9,10", text));
+                fmt::format("--vary {}: is written KEY=SPEC, for example hub.mass=8,9,10", text));
   Variation v;
   v.name = text.substr(0, sign);
   std::string keys = v.name;
@@ -142,7 +142,7 @@ Variation variation_of(const std::string& text) {
   } else {
     const std::vector<std::string_view> words = {"lin", "log", "normal", "uniform"};
     require_usage(parts.size() == 1 || toml_reader::nearest(parts[0], words).empty(),
-            fmt::format("--vary {}: {}", v.name, toml_reader::not_among(parts[0], words)));
+                  fmt::format("--vary {}: {}", v.name, toml_reader::not_among(parts[0], words)));
     for (const std::string& entry : split_at(spec, ',')) v.list.push_back(key_variant(entry));
   }
   for (const KeyVariant& value : v.list)
@@ -166,8 +166,8 @@ SweepValues::SweepValues(const SweepDesign& design) {
   if (sampling_ == Sampling::grid) {
     require_usage(all_lists, "--sample grid takes lists only: a,b,c or lin:a:b:n or log:a:b:n; give -n N to draw runs");
     require_usage(!design.n,
-            "-n: a grid has as many runs as its lists have combinations; to draw from the lists, give "
-            "--sample random, lhs or sobol");
+                  "-n: a grid has as many runs as its lists have combinations; to draw from the lists, give "
+                  "--sample random, lhs or sobol");
     runs_ = 1;
     for (const Variation& v : variations_) {
       require(runs_ <= most_runs / v.list.size(), fmt::format("the grid has more than {} runs", most_runs));
@@ -176,8 +176,8 @@ SweepValues::SweepValues(const SweepDesign& design) {
     return;
   }
   require_usage(design.n.has_value() && *design.n > 0 && *design.n <= most_runs,
-          fmt::format("--sample {} needs the number of runs, -n from 1 to {}",
-                      sampling_names[static_cast<size_t>(sampling_)], most_runs));
+                fmt::format("--sample {} needs the number of runs, -n from 1 to {}",
+                            sampling_names[static_cast<size_t>(sampling_)], most_runs));
   const size_t d = design.indices ? varying_.size() : variations_.size();
   require_usage(d > 0, "--indices needs a key that takes more than one value");
   if (design.indices) base_points_ = *design.n;

@@ -80,6 +80,24 @@ TEST(Warnings, OfSpringsAndStartsBeyondTheStop) {
     EXPECT_FALSE(any_has(load_scene(name).warnings, "beyond the stop")) << name;
 }
 
+TEST_P(WarningsOfRuns, ASpringPressedToAPointIsAFault) {
+  const std::string spring =
+      "[[springs]]\nname = \"bumper\"\nstiffness = 3\na = { body = \"hub\", point = [0.05, 0, 0] }\n"
+      "b = { body = \"boom\", marker = \"root\" }\nfree_length = ";
+  Scene scene = parse_scene(swing_on_joints + spring + "0.1\n", "spring.toml");
+  EXPECT_THROW(run(scene), InputError);
+  scene.springs[0].free_length = 0;
+  EXPECT_NO_THROW(run(scene));
+}
+
+TEST(Warnings, OfPerCent) {
+  for (const std::string rule : {"modal", "loss-factor"}) {
+    const std::string scene =
+        with(swing_on_joints, "rule = \"modal\", value = 0.05", "rule = \"" + rule + "\", value = 5");
+    EXPECT_TRUE(any_has(parse_scene(scene, "x.toml").warnings, "body boom: its damping ratio is ")) << rule;
+  }
+}
+
 TEST(Warnings, OfKilometresAndDegrees) {
   const std::string joint = swing_on_joints + "rest = 90\n";
   EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: has the rest of its spring at 90 rad"));
