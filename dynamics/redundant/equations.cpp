@@ -180,6 +180,16 @@ void Equations::scatter_correction(const PlaceData& p, const PlaceForce<double>&
         p, f, y + at.q, [&](Index k) { return metric[6 + k]; }, F + at.q);
 }
 
+BodyInput Equations::body_input(size_t i, const double* y, const double* y_dot) const {
+  const BodyPlaces& at = places_[i];
+  return {rotation(y + at.p),  three(y + at.w), y + at.q, y + at.u, three(y_dot + at.v) - vec3(scene_.gravity),
+          three(y_dot + at.w), y_dot + at.u};
+}
+
+Eigen::MatrixXd Equations::mass(size_t i, const double* y) const {
+  return body_mass(prepared_.bodies[i], rotation(y + places_[i].p), y + places_[i].q, scratch_->bodies[i].deformed);
+}
+
 void Equations::body_residual(size_t i, const double* y, const double* y_dot, double* F) {
   const BodyPlaces& at = places_[i];
   const double *p = y + at.p, nu = y[at.nu];
@@ -189,14 +199,12 @@ void Equations::body_residual(size_t i, const double* y, const double* y_dot, do
   for (int k = 0; k < at.n; ++k) F[at.q + k] += y_dot[at.q + k] - y[at.u + k];
   F[at.nu] = 0.5 * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3] - 1);
 
-  BodyInput<double> x{
-      rotation(p),         three(y + at.w), y + at.q, y + at.u, three(y_dot + at.v) - vec3(scene_.gravity),
-      three(y_dot + at.w), y_dot + at.u};
   Vec3<double> on_R, on_w;
-  body_forces(prepared_.bodies[i], x, scratch_->bodies[i].deformed, on_R, on_w, scratch_->bodies[i].on_q.data());
+  BodyScratch& s = scratch_->bodies[i];
+  body_forces(prepared_.bodies[i], body_input(i, y, y_dot), on_R, on_w, s.on_q.data(), s.deformed);
   subtract(-on_R, F + at.v);
   subtract(-on_w, F + at.w);
-  for (int k = 0; k < at.n; ++k) F[at.u + k] += scratch_->bodies[i].on_q[static_cast<size_t>(k)];
+  for (int k = 0; k < at.n; ++k) F[at.u + k] += s.on_q[static_cast<size_t>(k)];
 }
 
 double Equations::pull_by_field(size_t i, double t, const double* y, double* F) const {
@@ -357,11 +365,11 @@ Equations::Momenta Equations::momenta(size_t i, const double* y) const {
   const BodyPlaces& at = places_[i];
   const BodyData& b = prepared_.bodies[i];
   const Mat3<double> A = rotation(y + at.p);
-  DeformedBody<double>& deformed = scratch_->bodies[i].deformed;
+  DeformedBody& deformed = scratch_->bodies[i].deformed;
   Vec3<double> P, H;
   Momenta of;
-  body_momenta(b, transposed_product(A, three(y + at.v)), three(y + at.w), y + at.q, y + at.u, deformed, P, H,
-               of.kinetic);
+  body_momenta(b, transposed_product(A, three(y + at.v)), three(y + at.w), y + at.q, y + at.u, P, H, of.kinetic,
+               deformed);
   of.linear = eigen(A * P);
   of.angular = eigen(A * H);
   of.first_moment = eigen(A * deformed.mc);

@@ -160,6 +160,8 @@ class Equations {
   void scatter(const PlaceData&, const PlaceForce<double>&, const double* y, double* F) const;
   void scatter_correction(const PlaceData&, const PlaceForce<double>&, const double* y, double* F) const;
   static RowMultipliers multipliers(const JointData&, const double* y);
+  /// The motion of a body, as body_forces wants it.
+  BodyInput body_input(size_t i, const double* y, const double* y_dot) const;
   void body_residual(size_t i, const double* y, const double* y_dot, double* F);
   /// Adds the field's gravity on body i to its rows; its power [W]. The Newton matrix leaves out its derivatives, which
   /// are of the size of the orbital rate squared.

@@ -167,34 +167,6 @@ MatrixXd unknown_map(const MatrixXd& freedoms, const double* quaternion) {
 
 }  // namespace
 
-MatrixXd Equations::mass(size_t i, const double* y) const {
-  const BodyPlaces& at = places_[i];
-  const BodyData& body = prepared_.bodies[i];
-  DeformedBody<double>& d = scratch_->bodies[i].deformed;
-  deform(body, y + at.q, d);
-  const Matrix3d A = rotation_matrix(Map<const Eigen::Vector4d>(y + at.p));
-  MatrixXd M = MatrixXd::Zero(6 + at.n, 6 + at.n);
-  M.topLeftCorner<3, 3>() = body.m * Matrix3d::Identity();
-  M.block<3, 3>(3, 0) = tilde(eigen(d.mc)) * A.transpose();
-  M.block<3, 3>(3, 3) << d.J[0], d.J[3], d.J[5], d.J[3], d.J[1], d.J[4], d.J[5], d.J[4], d.J[2];
-  const auto r = static_cast<Index>(body.shapes) - at.n;
-  Eigen::Matrix3Xd Ct(3, at.n + r), Cr(3, at.n + r);
-  for (Index k = 0; k < at.n + r; ++k) {
-    Ct.col(k) = A * eigen(body.Ct[static_cast<size_t>(k)]);
-    Cr.col(k) = eigen(d.Cr[static_cast<size_t>(k)]);
-  }
-  const Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> slope(d.slope.data(), r,
-                                                                                                at.n);
-  M.block(6, 0, at.n, 3) = (Ct.leftCols(at.n) + Ct.rightCols(r) * slope).transpose();
-  M.block(6, 3, at.n, 3) = (Cr.leftCols(at.n) + Cr.rightCols(r) * slope).transpose();
-  M.bottomRightCorner(at.n, at.n) = body.Me;
-  if (r > 0) {
-    const MatrixXd mixed = body.Me_follow.transpose() * slope;
-    M.bottomRightCorner(at.n, at.n) += mixed + mixed.transpose() + body.m * slope.transpose() * slope;
-  }
-  return M.selfadjointView<Eigen::Lower>();
-}
-
 void Equations::body_newton(size_t i, double t, double c, const double* y, const double* y_dot, PatternSum& out) {
   const BodyPlaces& at = places_[i];
   const BodyData& body = prepared_.bodies[i];
@@ -211,42 +183,10 @@ void Equations::body_newton(size_t i, double t, double c, const double* y, const
   }
   for (int k = 0; k < 4; ++k) out.add(at.p + k, at.nu, -p[k]), out.add(at.nu, at.p + k, p[k]);
 
-  // Directions: theta, w, q, u.
-  MatrixXd D(6 + n, 6 + 2 * n);
-  BodyScratch& s = scratch_->bodies[i];
-  for (Index first = 0; first < 6 + 2 * n; first += 8) {
-    for (Index k = 0; k < n; ++k) {
-      s.q[static_cast<size_t>(k)] = Lanes(y[at.q + k]);
-      s.q_dot[static_cast<size_t>(k)] = Lanes(y[at.u + k]);
-    }
-    BodyInput<Lanes> x{
-        lanes(rotation(p)),  lanes(three(w)), s.q.data(), s.q_dot.data(), three(y_dot + at.v) - vec3(scene_.gravity),
-        three(y_dot + at.w), y_dot + at.u};
-    const Index count = std::min<Index>(8, 6 + 2 * n - first);
-    for (Index k = 0; k < count; ++k) {
-      const Index d = first + k;
-      const int lane = static_cast<int>(k);
-      if (d < 3)
-        turn(x.A, {d == 0 ? 1.0 : 0.0, d == 1 ? 1.0 : 0.0, d == 2 ? 1.0 : 0.0}, lane);
-      else if (d < 6)
-        component(x.w, static_cast<int>(d - 3)).d[lane] = 1;
-      else
-        (d < 6 + n ? s.q[static_cast<size_t>(d - 6)] : s.q_dot[static_cast<size_t>(d - 6 - n)]).d[lane] = 1;
-    }
-    Vec3<Lanes> on_R, on_w;
-    body_forces(body, x, s.deformed_lanes, on_R, on_w, s.on_q_lanes.data());
-    for (Index k = 0; k < count; ++k) {
-      const int lane = static_cast<int>(k);
-      for (int r = 0; r < 3; ++r) {
-        D(r, first + k) = component(on_R, r).d[lane];
-        D(3 + r, first + k) = component(on_w, r).d[lane];
-      }
-      for (Index r = 0; r < n; ++r) D(6 + r, first + k) = s.on_q_lanes[static_cast<size_t>(r)].d[lane];
-    }
-  }
+  const MatrixXd D = body_force_derivatives(body, body_input(i, y, y_dot), scratch_->bodies[i].deformed);
   out.add_block(at.v, at.p, MatrixXd(D.leftCols(3) * quaternion_map(p)));
   out.add_block(at.v, at.q, D.middleCols(6, n));
-  MatrixXd V = c * mass(i, y);
+  MatrixXd V = c * mass(i, y);  // of v, w, u
   V.middleCols(3, 3) += D.middleCols(3, 3);
   V.rightCols(n) += D.rightCols(n);
   for (size_t k = 0; k < scene_.wheels.size(); ++k) {

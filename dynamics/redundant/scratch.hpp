@@ -12,13 +12,10 @@
 namespace flexboom::redundant {
 
 struct BodyScratch {
-  DeformedBody<double> deformed;
+  DeformedBody deformed;
   std::vector<double> on_q;
-  DeformedBody<Lanes> deformed_lanes;
-  std::vector<Lanes> q, q_dot, on_q_lanes;
 
-  explicit BodyScratch(const BodyData& b)
-      : deformed(b), on_q(b.n), deformed_lanes(b), q(b.n), q_dot(b.n), on_q_lanes(b.n) {}
+  explicit BodyScratch(const BodyData& b) : deformed(b), on_q(b.n) {}
 };
 
 struct EquationScratch {
