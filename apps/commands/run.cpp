@@ -288,7 +288,7 @@ nlohmann::ordered_json checked(const std::string& name) {
 }  // namespace
 
 int run_command(const RunArguments& a, const CommonOptions& common) {
-  require_usage(!std::isnan(a.checkpoint), "--checkpoint: is not a number of seconds");
+  require(!std::isnan(a.checkpoint), "--checkpoint: is not a number of seconds");
   const Scene scene = scene_of(a, common.quiet);
   const std::filesystem::path folder = common.out.empty() ? std::filesystem::path("results") / scene.name : common.out;
   ResultsFolder results(folder, scene, builtin_scene(a.scene) ? "" : a.scene);

@@ -15,6 +15,7 @@
 #include <numbers>
 #include <set>
 #include <utility>
+#include <vector>
 
 // Comparisons of a value that stands alone are written so that NaN fails them. Comparisons of two values are written so
 // that NaN passes them. So the fault is reported once, at the value that is NaN.
@@ -58,6 +59,7 @@ void check_accuracy(Faults& faults, const Scene& scene) {
   const std::vector<std::string> known = outputs_of(with_joints(scene));
   const std::vector<std::string_view> names(known.begin(), known.end());
   if (!body_names_known(faults, scene)) return;
+  std::set<std::string> before;
   for (const std::string& text : scene.outputs) {
     WantedOutput wanted;
     try {
@@ -66,6 +68,8 @@ void check_accuracy(Faults& faults, const Scene& scene) {
       faults.add("accuracy.outputs", e.what());
       continue;
     }
+    if (!before.insert(wanted.name).second)
+      faults.add("accuracy.outputs", fmt::format("names {} twice; leave one", toml_reader::in_quotes(wanted.name)));
     if (wanted.accuracy > 0 && wanted.unit.empty() && wanted.accuracy < scene.tolerance)
       faults.add("accuracy.outputs",
                  fmt::format("is '{}', tighter than tolerance, {:g}; tolerance is the tightest that is relative", text,
@@ -219,26 +223,32 @@ void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
   if (scene.orbit && scene.orbit->altitude < thick)
     warnings.push_back(
         fmt::format("orbit.altitude: {:g} m is inside the atmosphere; it is in m", scene.orbit->altitude));
-  const auto look = [&](const std::string& of, const HingeMechanism& m, double start, std::string_view unit) {
+  const auto look = [&](const std::string& of, const HingeMechanism& m, const JointLaw& law, double start,
+                        std::string_view unit) {
     constexpr double turns = 4 * std::numbers::pi;  // of a hinge, whose springs and stops count them
     for (const auto& [what, value] : {std::pair("starts", start), std::pair("has the rest of its spring", m.rest)})
       if (unit == "rad" && std::abs(value) > turns)
         warnings.push_back(fmt::format("{}: {} at {:g} rad, {:.1f} turns; angles are in rad", of, what, value,
                                        std::abs(value) / (2 * std::numbers::pi)));
-    if (m.stop_stiffness == 0) return;
-    if (m.stiffness > 0 && m.rest > m.threshold)
-      warnings.push_back(
-          fmt::format("{}: the spring is at rest at {:g} {}, beyond the stop at {:g} {}: it presses on it", of, m.rest,
-                      unit, m.threshold, unit));
-    if (start > m.threshold)
-      warnings.push_back(
-          fmt::format("{}: starts at {:g} {}, beyond the stop at {:g} {}: the stop is pressed in by {:g} {}", of, start,
-                      unit, m.threshold, unit, start - m.threshold, unit));
+    std::vector<std::pair<double, int>> pads;  // where, and on which side
+    if (m.stop_stiffness > 0) pads.emplace_back(m.threshold, 1);
+    if (law.upper_stop && !law.upper_stop->restitution) pads.emplace_back(law.upper_stop->at, 1);
+    if (law.lower_stop && !law.lower_stop->restitution) pads.emplace_back(law.lower_stop->at, -1);
+    for (const auto& [at, side] : pads) {
+      if (m.stiffness > 0 && side * (m.rest - at) > 0)
+        warnings.push_back(
+            fmt::format("{}: the spring is at rest at {:g} {}, beyond the stop at {:g} {}: it presses on it", of,
+                        m.rest, unit, at, unit));
+      if (side * (start - at) > 0)
+        warnings.push_back(
+            fmt::format("{}: starts at {:g} {}, beyond the stop at {:g} {}: the stop is pressed in by {:g} {}", of,
+                        start, unit, at, unit, side * (start - at), unit));
+    }
   };
-  for (const HingeScene& h : scene.hinges) look("hinge " + h.body, h.hinge.mechanism, h.start_angle, "rad");
+  for (const HingeScene& h : scene.hinges) look("hinge " + h.body, h.hinge.mechanism, {}, h.start_angle, "rad");
   for (const JointScene& j : scene.joints)
     if (joint_type(j.kind).scalars == 1)
-      look("joint " + j.name, j.mechanism, j.start.empty() ? j.mechanism.rest : j.start[0],
+      look("joint " + j.name, j.mechanism, j.law, j.start.empty() ? j.mechanism.rest : j.start[0],
            j.kind == JointKind::slider ? "m" : "rad");
   for (const BodyScene& b : scene.bodies) {
     const double ratio = b.damping.name == "loss-factor" ? b.damping.value / 2 : b.damping.value;

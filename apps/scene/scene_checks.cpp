@@ -19,7 +19,7 @@ std::string join(const std::string& path, std::string_view key) {
 namespace {
 
 // Beyond these a product of a few of them is no longer a number, or zero.
-constexpr double least_size = 1e-50, most_size = 1e50;
+constexpr double least_size = 1e-50, most_size = 1e30;
 
 }  // namespace
 

@@ -342,7 +342,8 @@ void place_keys(Archive& a, PlaceScene& p) {
   const bool both = a.use() != Use::write;
   a.key({"body", "", "name of the body, or `\"ground\"`: the inertial frame"}, body);
   if (both || !p.marker.empty()) a.key({"marker", "", "of a flexible body", false, "`point`"}, p.marker);
-  if (both || p.marker.empty()) a.key({"point", "m", "in the axes of the body"}, p.point, finite);
+  if (both || p.marker.empty())
+    a.key({"point", "m", "in the axes of the body; of an elastic one it moves with the root alone"}, p.point, finite);
   a.key({"x", "", "unit vector, axes of the body: x of the place"}, p.x, direction);
   a.key({"z", "", "unit vector normal to it: z of the place"}, p.z, direction);
   KeyReader* reader = a.reader();

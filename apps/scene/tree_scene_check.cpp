@@ -9,6 +9,7 @@
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <Eigen/Geometry>
 
 #include <algorithm>
@@ -80,6 +81,22 @@ class TreeCheck {
     return nullptr;
   }
 
+  /// The frame is fixed to the root. What bends away from it is no part of the frame.
+  void point_of_the_frame(const std::string& path, const Eigen::Vector3d& point, const BodyScene& body) {
+    constexpr double same = 1e-9;  // of the body's size
+    if (body.is_boom() && point.x() > same * body.geometry.length())
+      faults_.add(path, fmt::format("is {:g} m along the boom, and a point moves with the root alone; give a marker, "
+                                    "\"{}\" or an attachment there",
+                                    point.x(), fmt::join(marker_names(body), "\", \"")));
+    if (!body.reduced) return;
+    double size = 0;
+    for (const Marker& m : body.reduced->markers) size = std::max(size, m.position.norm());
+    for (const Marker& m : body.reduced->markers)
+      if (!m.S.isZero(0) && (m.position - point).norm() <= same * size)
+        faults_.add(path, fmt::format("is at marker {}, but a point moves with the frame alone; give the marker",
+                                      toml_reader::in_quotes(m.name)));
+  }
+
   void place(const std::string& path, const PlaceScene& p) {
     if (std::abs(p.x.dot(p.z)) > round_off && faults_.clean(path + ".z"))
       faults_.add(path + ".x", fmt::format("is not normal to z, [{}, {}, {}]; it must be", p.z.x(), p.z.y(), p.z.z()));
@@ -93,6 +110,8 @@ class TreeCheck {
       faults_.add(path + ".point",
                   "is a point of the frame, which no material of this body follows: its basis moves the root, too; "
                   "give a marker");
+    else if (p.marker.empty() && body->is_elastic())
+      point_of_the_frame(path + ".point", p.point, *body);
     if (p.marker.empty()) return;
     const std::vector<std::string> names = marker_names(*body);
     if (names.empty()) return faults_.add(path + ".marker", fmt::format("a rigid body has none; give a point"));
@@ -296,6 +315,10 @@ class TreeCheck {
   void spring(const std::string& path, const SpringScene& s) {
     place(path + ".a", s.a);
     place(path + ".b", s.b);
+    const auto both_on = std::ranges::find(scene_.bodies, s.a.body, &BodyScene::name);
+    const bool bends = both_on != scene_.bodies.end() && both_on->is_elastic();
+    if (s.a.body == s.b.body && (!bends || s.a.marker == s.b.marker))
+      faults_.add(path + ".b", "is fixed to a, so the spring never changes its length; choose another place");
   }
 
   void load(const std::string& path, const LoadScene& l) {

@@ -325,8 +325,17 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
   return Choice{moved > 0 ? static_cast<double>(enough) / static_cast<double>(moved) : 0, error_of_fewer};
 }
 
+/// A force that is there at once, when a run begins, moves the effective masses of all modes: what is left out of it
+/// falls as 1 / n, whatever happens later. Can no number of candidates make it small enough?
+bool Planner::is_hopeless_front(const OutputErrors& o, double tolerance) const {
+  return o.name.ends_with(".force") && o.when == 0 && o.truncation > most_candidates / candidates_ * tolerance;
+}
+
 bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {
-  const OutputErrors* worst = budget.worst();
+  const auto is_front = [&](const OutputErrors& o) { return is_hopeless_front(o, scene.tolerance); };
+  const OutputErrors* worst = nullptr;  // of those that may be mended
+  for (const OutputErrors& o : budget.outputs)
+    if (!is_front(o) && (worst == nullptr || o.known() > worst->known())) worst = &o;
   if (budget.has_stiffened) still_.clear();  // geometric stiffness couples kinds
   if (open_.empty() || !budget.measured || budget.within(scene.tolerance) || worst == nullptr || hooks.stopped() ||
       steps_++ >= most_rounds)
@@ -336,6 +345,11 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
   // A repeat has an error of time of its own. Where those are large, what is no more than both is no truncation.
   const double time = known(worst->time), of_both = time > scene.tolerance / 3 ? 2 * time : time;
   const double others = std::max(of_both, known(worst->linearisation));
+  if (const auto front = std::ranges::find_if(budget.outputs, is_front);
+      worst->known() <= scene.tolerance && front != budget.outputs.end())
+    plan.push_back(
+        fmt::format("truncation: {:.1e} in {}; more modes are not tried: it is there at the start, and falls as 1 / n",
+                    front->truncation, front->name));
   if (worst->known() <= scene.tolerance || std::max(truncation, discretisation) <= others) return false;
   if (truncation >= discretisation) {
     const double before = std::exchange(truncation_, worst->truncation);

@@ -25,7 +25,7 @@ class Planner {
 
   /// A better model where the largest part of the budget's worst output is truncation (more candidates) or
   /// discretisation (finer elements). False: the budget is met, or what stops it is not for a plan to mend: another
-  /// part, or a truncation that more modes hardly change.
+  /// part, a truncation that more modes hardly change, or a force that is there at once when the run begins.
   bool improve(Scene&, const ErrorBudget&, const RunHooks&, std::vector<std::string>& plan);
 
   /// Kinds of which nothing moves any candidate, as symmetry has it: more of them are not tried.
@@ -58,6 +58,7 @@ class Planner {
   bool has_choice(const Scene&, const std::string& body) const;
   std::vector<Candidate> ranked(const Scene&, const Run&) const;
   void note_still(const std::vector<Candidate>&);
+  bool is_hopeless_front(const OutputErrors&, double tolerance) const;
   Scene with_first(const Scene& all, const std::vector<Candidate>&, size_t count) const;
 
   /// Modes beside those of the plan that have shown its truncation: candidates, too, from then on.

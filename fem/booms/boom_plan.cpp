@@ -21,6 +21,7 @@ constexpr int max_solid_order = 8;
 double uneven_quarter(int order) { return order <= 4 ? 0.05 : 0.022; }
 constexpr double slender_ratio = 62;   // length over half depth
 constexpr int longest_element = 4;     // by its width, of order 4 or more
+constexpr int most_sectors = 6;        // of a side: a plate bends in waves much longer than it is thick
 constexpr int max_divisions = 100000;  // of anything; more is a typing error
 
 bool same(double a, double b) { return std::abs(a - b) <= relative_round_off * std::max(std::abs(a), std::abs(b)); }
@@ -258,7 +259,8 @@ std::array<int, 2> sectors_of(const BeamGeometry& boom, const SolidOptions& opti
   const double stretch = std::min(options.order, longest_element);
   for (size_t k = 0; k < 2; ++k) {
     const double along = size(k == 0 ? 1 : 0);  // the sides that face y run along z
-    sectors[k] = std::max(n, static_cast<int>(std::ceil(n * along / size.minCoeff() / stretch - 1e-9)));
+    const double wanted = n * along / size.minCoeff() / stretch;
+    sectors[k] = std::max(n, static_cast<int>(std::ceil(std::min<double>(wanted, most_sectors) - 1e-9)));
   }
   return sectors;
 }

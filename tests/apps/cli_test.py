@@ -121,10 +121,10 @@ class Usage(Case):
         for option, value in (("--sample", "often"), ("--quantity", "tip"), ("--shard", "3/2"), ("--shard", "half")):
             self.assert_usage("sweep", "sport", "--vary", "hub.mass=8,9", option, value, words=option)
         self.assert_usage("sweep", "sport", words="--vary")
-        self.assert_usage("run", "sport", "--modes", "few", words="--modes")
-        self.assert_usage("modes", BOOM4, "--material", "67e9,0.33", words="--material")
-        self.assert_usage("reduce", BOOM4, "-o", "boom.h5", "--damping", "modal", words="--damping")
-        self.assert_usage("reduce", BOOM4, "-o", "boom.h5", "--select", "best", words="--select")
+        for text in ("many", "-1", "2.5", "99999999999"):
+            self.assert_usage("run", "sport", "--modes", text, words=f"'{text}'")
+        for text in ("nonsense", "67e9,0.33", "67e9,0.33,2840,1", "nan,0.3,1"):
+            self.assert_usage("modes", BOOM4, "--material", text, words="material")
 
     def test_free_and_clamp_exclude_each_other(self):
         self.assert_usage("modes", BOOM4, "--free", "--clamp", "root", words="--clamp")
@@ -184,10 +184,6 @@ class BadInput(Case):
         self.assert_refused("check", "absent.toml", words="absent.toml")
         self.assert_refused("compare", "absent.toml", words="absent.toml")
 
-    def test_modes_that_are_no_number(self):
-        for text in ("many", "-1", "2.5", "99999999999"):
-            self.assert_run_refused("--modes", text, words=f"'{text}'")
-
     def test_more_modes_than_unknowns(self):
         self.assert_run_refused("--modes", "1000", "--structure", "beam", words="modes")
 
@@ -233,7 +229,7 @@ class BadInput(Case):
         self.assert_refused("modes", BOOM4, "--count", "100000", words="unknowns")
         self.assert_exit(USAGE, flexboom("modes", BOOM4, "--count", "0"))
         self.assert_refused("modes", BOOM4, "--clamp", "absent", words='"root"')
-        for text in ("nonsense", "67e9,0.33", "67e9,0.33,2840,1", "67e9,0.6,2840", "-1,0.3,1", "nan,0.3,1"):
+        for text in ("67e9,0.6,2840", "-1,0.3,1"):
             self.assert_refused("modes", BOOM4, "--material", text, words="material")
 
     def test_compare_needs_a_uniform_boom(self):
@@ -1279,9 +1275,9 @@ class Reduce(Case):
         self.assert_exit(code, result)
         return body, json.loads(result.stdout)
 
-    def refused(self, *arguments, words):
+    def refused(self, *arguments, words, code=INPUT):
         result = flexboom("reduce", BOOM4, "-o", self.folder / "body.h5", *arguments)
-        self.assert_exit(INPUT, result)
+        self.assert_exit(code, result)
         self.assertEqual(result.stdout, "")
         self.assertIn(words, result.stderr)
         self.assertEqual(os.listdir(self.folder), [])
@@ -1404,11 +1400,11 @@ class Reduce(Case):
         self.refused("--basis", "hinge", words="--hinge-stiffness")
         self.refused("--basis", "prestressed", words="--spin")
         self.refused("--spin", "0,0,1", words="prestressed")
-        self.refused("--basis", "prestressed", "--spin", "0,0,1", "--turns", "w", words="X,Y,Z")
-        self.refused("--select", "best", words="--select")
+        self.refused("--basis", "prestressed", "--spin", "0,0,1", "--turns", "w", words="X,Y,Z", code=USAGE)
+        self.refused("--select", "best", words="--select", code=USAGE)
         self.refused("--select", "list:0", words="they are 1 to")
-        self.refused("--select", "list:1,2,", words="numbers between commas")
-        self.refused("--damping", "much", words="--damping")
+        self.refused("--select", "list:1,2,", words="numbers between commas", code=USAGE)
+        self.refused("--damping", "much", words="--damping", code=USAGE)
         self.refused("--attach", "tip", words="tip.Fy")
 
     def test_name_of_the_file(self):

@@ -100,6 +100,20 @@ TEST(Planner, ARunGoesOnToBetterModelsUntilTheBudgetIsMet) {
 
 // The load of a joint converges as 1 / n with the modes of a free body. Its static shapes stand for the rest: in what
 // is planned, and in what shows the truncation of a body without them.
+/// A torque sets in at once: what the mount carries then lacks the effective mass of the modes left out.
+TEST(Planner, NoMoreModesAreTriedForAForceThatIsThereAtOnce) {
+  Scene scene = spun_about("z", 1e-4);
+  scene.outputs = {"boom.tip", "mount.force"};
+  scene.joints.back().loads = true;
+  const RunResult r = run_scene(scene, {});
+  EXPECT_TRUE(any_has(r.plan, "in mount.force; more modes are not tried: it is there at the start"));
+  EXPECT_FALSE(any_has(r.plan, "in mount.force; modes are chosen again"));
+  EXPECT_EQ(r.budget.worst()->name, "mount.force");
+  const auto tip = std::ranges::find(r.budget.outputs, "boom.tip", &OutputErrors::name);
+  ASSERT_NE(tip, r.budget.outputs.end());
+  EXPECT_LT(tip->total(), scene.tolerance);
+}
+
 TEST(Planner, BodiesUnderMeanAxesHaveStaticShapesOfTheirJoints) {
   const auto swung = [](const std::string& modes, double tolerance) {
     Scene scene = spun_about("z", tolerance, modes);

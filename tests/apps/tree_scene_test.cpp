@@ -268,6 +268,11 @@ TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
       {"gravity = [0, 0, -9.81]", "orbit = { eccentricity = 1 }", "orbit.eccentricity: is 1; it must lie in [0, 1)"},
       {"mass = 8.5", "mass = -8.5", "bodies[0].mass: is -8.5 kg"},
       {"stiffening = \"on\"", "stiffening = \"on\"\nstructure = \"eq14\"", "has none; use \"beam\""},
+      {"at = { body = \"arm\", marker = \"tip\" }", "at = { body = \"arm\", point = [0.1, 0, 0] }",
+       "loads[0].at.point: is 0.1 m along the boom, and a point moves with the root alone; give a marker, \"root\""},
+      {"b = { body = \"ground\", point = [1, 1, 1] }", "b = { body = \"ball\", point = [1, 1, 1] }",
+       "springs[0].b: is fixed to a"},
+      {"\"lift.length\"", "\"lift.length\", \"lift.length 1e-3\"", "accuracy.outputs: names \"lift.length\" twice"},
       {"stiffness = 3\n", "stiffness = -3\n", "springs[0].stiffness: is -3 N/m"},
       {"b = { body = \"hub\" }", "b = { }", "joints[0].b: has no body"},
   };

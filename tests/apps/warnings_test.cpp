@@ -74,6 +74,13 @@ TEST(Warnings, OfSpringsAndStartsBeyondTheStop) {
   const std::string joint = swing_on_joints + "stop_stiffness = 10\nthreshold = 0.05\nrest = 0.06\n";
   EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: starts at 0.07 rad, beyond the stop"));
   EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: the spring is at rest at 0.06 rad"));
+  for (const std::string pad : {"upper_stop = { at = 0.05, ", "lower_stop = { at = 0.08, "}) {
+    const std::string law =
+        swing_on_joints + pad + "stiffness = 10 }\nrest = " + (pad[0] == 'u' ? "0.06" : "0.07") + "\n";
+    EXPECT_TRUE(any_has(parse_scene(law, "x.toml").warnings, "joint hinge: starts at 0.07 rad, beyond the stop"))
+        << pad;
+    EXPECT_TRUE(any_has(parse_scene(law, "x.toml").warnings, "joint hinge: the spring is at rest at 0.0")) << pad;
+  }
   for (const std::string& text : {swing_on_hinge, swing_on_joints})
     EXPECT_TRUE(parse_scene(text, "x.toml").warnings.empty());
   for (const std::string& name : builtin_scene_names())
