@@ -1,7 +1,7 @@
 #pragma once
 
 #include "apps/model/model.hpp"
-#include "apps/model/reduction.hpp"
+#include "apps/model/reduce_arguments.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,6 @@
 #include "apps/base/usage.hpp"
 #include "apps/commands/commands.hpp"
+#include "apps/model/body_text.hpp"
 #include "fem/base/check.hpp"
 #include "reduction/body_file/body_file.hpp"
 #include "reduction/exports/exports.hpp"

@@ -1,4 +1,5 @@
 #include "apps/commands/commands.hpp"
+#include "apps/model/body_text.hpp"
 #include "reduction/body_file/body_file.hpp"
 #include "reduction/invariants/certificate.hpp"
 

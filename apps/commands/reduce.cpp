@@ -1,5 +1,6 @@
 #include "apps/commands/commands.hpp"
 #include "apps/commands/terminal_line.hpp"
+#include "apps/model/body_text.hpp"
 #include "apps/model/richer_bodies.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"

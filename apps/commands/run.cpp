@@ -146,6 +146,40 @@ void take_digits(Scene& scene, const std::filesystem::path& folder) {
   scene.limit_digits_share(load_scene(file.string()).digits_share());
 }
 
+/// The numbers of a saved state mean the same where bodies and joints are the same. @throws InputError where a joint
+/// has another kind.
+void warn_of_changes(Scene& scene, const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "scene.toml";
+  if (!std::filesystem::exists(file)) return;
+  const Scene before = load_scene(file.string());
+  const auto warn = [&](std::string_view what, const std::string& name) {
+    scene.warnings.push_back(
+        fmt::format("--continue: {} {} is another one in {}: it goes on from the numbers of that one", what, name,
+                    folder.string()));
+  };
+  for (const BodyScene& b : scene.bodies) {
+    const auto p = std::ranges::find(before.bodies, b.name, &BodyScene::name);
+    if (!b.is_boom() || !b.is_elastic() || p == before.bodies.end()) continue;
+    BodyScene same = *p;  // but for what the state says itself, and what changes no coordinate's meaning
+    same.modes = b.modes, same.modes_auto = b.modes_auto, same.shapes = b.shapes;
+    same.directions = b.directions, same.directions_given = b.directions_given;
+    same.damping = b.damping, same.other_damping = b.other_damping;
+    same.stiffening = b.stiffening, same.solid = b.solid, same.geometry.order = b.geometry.order;
+    same.basis.corrections = b.basis.corrections, same.basis.motion = b.basis.motion;
+    if (to_toml(same) != to_toml(b)) warn("body", b.name);
+  }
+  const auto is_same = [](const PlaceScene& a, const PlaceScene& b) {
+    return a.body == b.body && a.marker == b.marker && a.point.isApprox(b.point) && a.axes().isApprox(b.axes());
+  };
+  for (const JointScene& j : scene.joints) {
+    const auto p = std::ranges::find(before.joints, j.name, &JointScene::name);
+    if (p == before.joints.end()) continue;
+    require(p->kind == j.kind, fmt::format("--continue: joint {} is a {} in {}, and a {} here", j.name,
+                                           joint_type(p->kind).name, folder.string(), joint_type(j.kind).name));
+    if (!is_same(p->a, j.a) || !is_same(p->b, j.b)) warn("joint", j.name);
+  }
+}
+
 /// The scene begins with a saved state, whose modes and static shapes replace those of the scene unless they are asked
 /// for.
 void go_on(Scene& scene, const RunArguments& a, bool quiet) {
@@ -172,6 +206,7 @@ void go_on(Scene& scene, const RunArguments& a, bool quiet) {
       b.basis.corrections = statics->second;
   }
   take_digits(scene, from);
+  warn_of_changes(scene, from);
   scene.from = std::move(saved);
 }
 

@@ -93,6 +93,8 @@ std::optional<Model> refined_if_bearable(const Model& model, int steps) {
 
 Model load_model(const std::filesystem::path& path, const ModelOptions& options) {
   Model model = path.extension() == ".toml" ? body_model(path, options) : file_model(path, options);
+  if (model.body && model.body->structure == "beam" && model.body->solid.slit > 0)
+    model.notes.emplace_back("the slit is one of structure = \"solid\"; a beam has none");
   for (std::string& suspicion : suspicions(model.mesh)) model.notes.push_back(std::move(suspicion));
   return model;
 }

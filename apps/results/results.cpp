@@ -1,8 +1,7 @@
 #include "apps/results/results.hpp"
 
-#include "apps/model/reduction.hpp"
-
 #include "apps/base/version.hpp"
+#include "apps/model/body_text.hpp"
 #include "apps/model/picture.hpp"
 #include "apps/simulate/tree_flight.hpp"
 #include "fem/base/check.hpp"

@@ -7,6 +7,7 @@
 #include "apps/scene/wanted_accuracy.hpp"
 #include "dynamics/methods/integrator.hpp"
 #include "fem/base/check.hpp"
+#include "fem/mesh/mesh.hpp"
 
 #include <fmt/format.h>
 
@@ -70,6 +71,9 @@ void check_accuracy(Faults& faults, const Scene& scene) {
     }
     if (!before.insert(wanted.name).second)
       faults.add("accuracy.outputs", fmt::format("names {} twice; leave one", toml_reader::in_quotes(wanted.name)));
+    constexpr double loosest = 0.1;  // as that of the scene
+    if (wanted.unit.empty() && wanted.accuracy > loosest)
+      faults.add("accuracy.outputs", fmt::format("is '{}', and an accuracy is at most {:g}", text, loosest));
     if (wanted.accuracy > 0 && wanted.unit.empty() && wanted.accuracy < scene.tolerance)
       faults.add("accuracy.outputs",
                  fmt::format("is '{}', tighter than tolerance, {:g}; tolerance is the tightest that is relative", text,
@@ -218,7 +222,57 @@ void check_scene(const Scene& scene, Faults& faults) {
   scene.is_tree ? check_tree(scene, faults) : check_connections(faults, scene);
 }
 
+namespace {
+
+/// What a body from a file is made of, away from its markers, nobody knows.
+void warn_of_points(const Scene& scene, std::vector<std::string>& warnings) {
+  const auto look = [&](const std::string& of, const PlaceScene& place) {
+    if (!place.marker.empty() || place.point.isZero(0)) return;
+    const auto body = std::ranges::find(scene.bodies, place.body, &BodyScene::name);
+    if (body == scene.bodies.end() || !body->reduced || body->reduced->n() == 0) return;
+    warnings.push_back(
+        fmt::format("{}: a point of body {} moves with its frame alone, whatever bends there; a marker bends with it",
+                    of, body->name));
+  };
+  for (const JointScene& j : scene.joints) look("joint " + j.name, j.a), look("joint " + j.name, j.b);
+  for (const SpringScene& s : scene.springs) look("spring " + s.name, s.a), look("spring " + s.name, s.b);
+  for (const LoadScene& l : scene.loads) look("load " + l.name, l.at);
+}
+
+/// A cubic through points that a ramp joins swings far beyond them.
+void warn_of_overshoot(const std::string& of, const CourseScene& course, std::vector<std::string>& warnings) {
+  if (!course.table || course.table->interpolation != "cubic") return;
+  constexpr int looks = 16;          // between two times
+  constexpr double bearable = 0.25;  // of the range of the values
+  const TimeTable& table = *course.table;
+  const TimeCourse cubic = time_table(table);
+  const auto [least, most] = std::ranges::minmax(table.value);
+  double worst = 0, when = 0;
+  for (size_t i = 0; i + 1 < table.time.size(); ++i)
+    for (int k = 1; k < looks; ++k) {
+      const double t = std::lerp(table.time[i], table.time[i + 1], static_cast<double>(k) / looks);
+      const double value = cubic.function.value(t), beyond = std::max(value - most, least - value);
+      if (beyond > worst) worst = beyond, when = t;
+    }
+  if (worst > bearable * (most - least) + 1e-9 * std::max(std::abs(least), std::abs(most)))
+    warnings.push_back(
+        fmt::format("{}: its cubic is {:.3g} at t = {:.4g} s, beyond its values of {:g} to {:g}; interpolation = "
+                    "\"linear\" or more times keep it within",
+                    of, cubic.function.value(when), when, least, most));
+}
+
+}  // namespace
+
 void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
+  warn_of_points(scene, warnings);
+  for (const JointScene& j : scene.joints) {
+    warn_of_overshoot("drive of joint " + j.name, j.drive, warnings);
+    for (const CourseScene& c : j.motion) warn_of_overshoot("motion of joint " + j.name, c, warnings);
+  }
+  for (const LoadScene& l : scene.loads)
+    for (const auto& three : {l.force, l.torque})
+      for (const CourseScene& c : three) warn_of_overshoot("load " + l.name, c, warnings);
+  for (const WheelScene& w : scene.wheels) warn_of_overshoot("torque of wheel " + w.name, w.torque, warnings);
   constexpr double thick = 1e5;  // [m] of the atmosphere, in which no orbit lasts
   if (scene.orbit && scene.orbit->altitude < thick)
     warnings.push_back(
@@ -251,6 +305,12 @@ void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
       look("joint " + j.name, j.mechanism, j.law, j.start.empty() ? j.mechanism.rest : j.start[0],
            j.kind == JointKind::slider ? "m" : "rad");
   for (const BodyScene& b : scene.bodies) {
+    if (b.is_boom() && b.structure != "solid" && b.solid.slit > 0)
+      warnings.push_back(
+          fmt::format("body {}: its slit is one of structure = \"solid\"; a {} has none", b.name, b.structure));
+    for (const BeamSegment& segment : b.is_boom() ? b.geometry.segments : std::vector<BeamSegment>{})
+      if (const std::string odd = suspicion(segment.material); !odd.empty())
+        warnings.push_back(fmt::format("body {}: {}", b.name, odd));
     const double ratio = b.damping.name == "loss-factor" ? b.damping.value / 2 : b.damping.value;
     if (ratio > 1)  // of critical damping
       warnings.push_back(

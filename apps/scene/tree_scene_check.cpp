@@ -189,6 +189,8 @@ class TreeCheck {
         faults_.add(path + "." + key, fmt::format("a {} joint has none; hinges and sliders have", type.name));
     };
     mechanism("stiffness", m.stiffness), mechanism("damping", m.damping), mechanism("stop_stiffness", m.stop_stiffness);
+    if (const HingeMechanism usual; m.threshold != usual.threshold && m.rest != usual.rest)
+      mechanism("threshold", std::abs(m.threshold)), mechanism("rest", std::abs(m.rest));
     Joint with_law;
     with_law.kind = j.kind, with_law.mechanism = m, with_law.law = j.law;
     with_law.prescribed.resize(j.motion.size());
@@ -252,6 +254,16 @@ class TreeCheck {
       return;  // a fault of its own
     }
     const double near = 1e-9 * scene_.duration;
+    double largest = 0;
+    for (int i = 0; i <= looks; ++i)
+      largest = std::max(largest, std::abs(course.function.value(scene_.duration * i / looks)));
+    for (const auto& [end, inside] : {std::pair(0.0, near), std::pair(scene_.duration, scene_.duration - near)}) {
+      const double step = course.function.value(inside) - course.function.value(end);
+      const double steepest = std::max(std::abs(course.function.rate(inside)), std::abs(course.function.rate(end)));
+      if (std::abs(step) > 4 * near * steepest + 1e-9 * largest)
+        return faults_.add(path,
+                           fmt::format("jumps by {:.4g} at t = {:.6g} s; a joint cannot, it needs a ramp", step, end));
+    }
     double fastest = 0;
     for (int i = 0; i <= looks; ++i)
       fastest = std::max(fastest, std::abs(course.function.rate(scene_.duration * i / looks)));
@@ -329,7 +341,11 @@ class TreeCheck {
   }
 
   void wheel(const std::string& path, const WheelScene& w) {
-    body_named(path + ".body", w.body);
+    if (const BodyScene* body = body_named(path + ".body", w.body); body != nullptr && body->root_moves())
+      faults_.add(path + ".body",
+                  fmt::format("is {}, and a wheel is fixed to the frame, which no material of this body follows: its "
+                              "basis moves the root, too; fix a rigid body to it that carries the wheel",
+                              toml_reader::in_quotes(w.body)));
     course(path + ".torque", w.torque);
   }
 

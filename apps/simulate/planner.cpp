@@ -337,6 +337,11 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
   for (const OutputErrors& o : budget.outputs)
     if (!is_front(o) && (worst == nullptr || o.known() > worst->known())) worst = &o;
   if (budget.has_stiffened) still_.clear();  // geometric stiffness couples kinds
+  const auto front = std::ranges::find_if(budget.outputs, is_front);
+  if (!open_.empty() && front != budget.outputs.end() && (worst == nullptr || worst->known() <= scene.tolerance))
+    plan.push_back(
+        fmt::format("truncation: {:.1e} in {}; more modes are not tried: it is there at the start, and falls as 1 / n",
+                    front->truncation, front->name));
   if (open_.empty() || !budget.measured || budget.within(scene.tolerance) || worst == nullptr || hooks.stopped() ||
       steps_++ >= most_rounds)
     return false;
@@ -345,11 +350,6 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
   // A repeat has an error of time of its own. Where those are large, what is no more than both is no truncation.
   const double time = known(worst->time), of_both = time > scene.tolerance / 3 ? 2 * time : time;
   const double others = std::max(of_both, known(worst->linearisation));
-  if (const auto front = std::ranges::find_if(budget.outputs, is_front);
-      worst->known() <= scene.tolerance && front != budget.outputs.end())
-    plan.push_back(
-        fmt::format("truncation: {:.1e} in {}; more modes are not tried: it is there at the start, and falls as 1 / n",
-                    front->truncation, front->name));
   if (worst->known() <= scene.tolerance || std::max(truncation, discretisation) <= others) return false;
   if (truncation >= discretisation) {
     const double before = std::exchange(truncation_, worst->truncation);

@@ -93,6 +93,12 @@ double Contacts::level(std::size_t i, const StopMotion& motion) const {
   return armed_[i] ? 0 : 2 * std::max(small(i, motion), asleep_[i]);
 }
 
+std::vector<char> Contacts::by_joint(std::span<const char> of_stops) const {
+  std::vector<char> flags(history_.size(), 0);
+  for (size_t i = 0; i < stops_.size(); ++i) flags[stops_[i].joint] = of_stops[i];
+  return flags;
+}
+
 std::vector<StopHistory> Contacts::histories() const {
   std::vector<StopHistory> all = history_;
   for (std::size_t i = 0; i < size(); ++i) {

@@ -92,6 +92,8 @@ class Contacts {
   /// One entry per stop. crossed: +1 where the gap rises through its level, -1 where it falls.
   const std::vector<char>& closed() const { return closed_; }
   std::vector<int>& crossed() { return crossed_; }
+  /// Flags of stops, one entry per joint.
+  std::vector<char> by_joint(std::span<const char> of_stops) const;
 
   /// One entry per joint, with what is closed now.
   std::vector<StopHistory> histories() const;

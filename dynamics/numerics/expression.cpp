@@ -114,8 +114,18 @@ double keep(Expression::Node node) {
   return static_cast<double>(record->size() - 1);
 }
 
+constexpr bool puts_in_order(const Operation& o) {
+  return o.precedence == mu::prCMP && o.name != "==" && o.name != "!=";
+}
+
 template <size_t row, class... Arguments>
 double keep_operation(Arguments... arguments) {
+  if constexpr (puts_in_order(operations[row]))
+    for (const double argument : {arguments...}) {
+      const int of = (*record)[static_cast<size_t>(argument)].operation;
+      if (of >= 0 && puts_in_order(operations[of]))
+        throw mu::ParserError("a comparison is 0 or 1 and is compared again; write (a < t) * (t < b)");
+    }
   return keep({static_cast<int>(row), {static_cast<int>(arguments)...}, 0});
 }
 

@@ -6,12 +6,12 @@
 #include "dynamics/redundant/body.hpp"
 #include "dynamics/redundant/joint.hpp"
 #include "dynamics/redundant/multipliers.hpp"
+#include "dynamics/redundant/pattern_sum.hpp"
 
 #include <Eigen/Core>
 
 #include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 namespace flexboom::redundant {
@@ -27,38 +27,6 @@ struct Prepared {
 
 /// Constants of a place, with those of geometric stiffness where its body has it on.
 PlaceData place_data(const Multibody&, const std::vector<Stiffening>&, const Place&);
-
-/// Sums what is added, always in the same order, into the values of a matrix with a fixed pattern.
-class PatternSum {
- public:
-  /// While recording, collects the pattern; `finish` sorts it by columns.
-  void add(int row, int column, double value) {
-    if (recording_)
-      places_.emplace_back(row, column);
-    else
-      values_[slots_[next_++]] += value;
-  }
-  template <class M>
-  void add_block(int row, int column, const M& block) {
-    for (Eigen::Index j = 0; j < block.cols(); ++j)
-      for (Eigen::Index i = 0; i < block.rows(); ++i)
-        add(row + static_cast<int>(i), column + static_cast<int>(j), block(i, j));
-  }
-  void finish(int size);
-  /// Starts over in these values.
-  void begin(double* values);
-
-  const std::vector<int>& starts() const { return starts_; }  // columns of the sparse matrix
-  const std::vector<int>& rows() const { return rows_; }
-
- private:
-  bool recording_ = true;
-  std::vector<std::pair<int, int>> places_;
-  std::vector<size_t> slots_;
-  std::vector<int> starts_, rows_;
-  size_t next_ = 0;
-  double* values_ = nullptr;
-};
 
 /// Places of a body's unknowns in y, [R p q v w u]; of its freedoms [R theta q].
 struct BodyPlaces {

@@ -161,7 +161,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   Push push(size_t stop, std::span<const char> closed) override {
     VectorXd y = y_, y_dot;
     JointMemory memory = memory_;
-    set_closed(closed, memory);
+    memory.closed = contacts_.by_joint(closed);
     equations_.make_consistent(t_, y, y_dot, memory);
     return {way_acceleration(contacts_.stop(stop).joint, y, y_dot), 0};
   }
@@ -230,10 +230,6 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     return std::max(round_off, of_steps * local_share * options_.tolerance * contacts_.largest_gap(stop));
   }
 
-  void set_closed(std::span<const char> closed, JointMemory& memory) const {
-    for (size_t i = 0; i < contacts_.size(); ++i) memory.closed[contacts_.stop(i).joint] = closed[i];
-  }
-
   void start_on_constraints(const std::vector<BodyState>& start) {
     y_ = equations_.pack(start);
     require(y_.allFinite(), "the start state is not finite");
@@ -273,7 +269,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     }
     follow_turns();
     contacts_.begin(*this);
-    set_closed(contacts_.closed(), memory_);
+    memory_.closed = contacts_.by_joint(contacts_.closed());
     if (laws_.empty()) return;
     laws_.begin(*this, t_, result_.events);
     equations_.project(t_, y_);
@@ -290,7 +286,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   }
 
   void restart() override {
-    set_closed(contacts_.closed(), memory_);
+    memory_.closed = contacts_.by_joint(contacts_.closed());
     for (size_t i = 0; i < contacts_.size(); ++i) levels_[i] = contacts_.level(i, *this);
     if (renumbered_) make_method();
     if (t_ > options_.start) {

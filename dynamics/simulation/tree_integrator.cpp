@@ -161,10 +161,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   void strike(double impulse) override { y_ += impulse * blow_; }
 
   void evaluate(std::span<const LawBranch> laws) {
-    const TreeLayout& l = tree_.layout();
-    std::vector<char> contact(l.joints.size(), 0);
-    for (size_t i = 0; i < contacts_.size(); ++i) contact[contacts_.stop(i).joint] = contacts_.closed()[i];
-    tree_.derivative(t_, y_.data(), contact, *work_, y_dot_.data(), laws);
+    tree_.derivative(t_, y_.data(), contacts_.by_joint(contacts_.closed()), *work_, y_dot_.data(), laws);
   }
 
   /// Stops come before the switches of laws.
@@ -222,8 +219,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     const double outputs = (options_.duration - options_.start) / options_.output_step;
     const auto stride = static_cast<size_t>(outputs / looks_at_stiffening) + 1;
     if (result_.time.size() % stride != 0) return;
-    std::vector<char> contact(tree_.scene().joints.size(), 0);
-    for (size_t i = 0; i < contacts_.size(); ++i) contact[contacts_.stop(i).joint] = contacts_.closed()[i];
+    const std::vector<char> contact = contacts_.by_joint(contacts_.closed());
     flexboom::observe(tree_.stiffening_effect(t, y, contact, *work_, laws_.branches()), t, effect_);
     if (look_) look_(effect_);
   }

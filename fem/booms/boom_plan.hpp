@@ -31,6 +31,15 @@ struct BoomPlan {
   bool core = false;
 };
 
+/// An element of order 4 or more may be so many of its widths long.
+inline constexpr int longest_element = 4;
+
+/// Is it solid or hollow, with flat sides?
+bool is_rectangle(const SectionShape&);
+
+/// Where quadrilaterals of a ring end, in (0, 1]. Walls of rectangular tubes are cut toward their inner edges.
+std::vector<double> cuts_of_ring(const BeamGeometry&, const SolidGrading&);
+
 /// @throws InputError as make_solid_mesh.
 BoomPlan plan_of(const BeamGeometry&, const SolidOptions&);
 

@@ -263,6 +263,16 @@ int part_count(const Mesh& mesh) {
   return count;
 }
 
+std::string suspicion(const Material& m) {
+  // Solids of technology weigh 1 to 23 000 kg/m^3 and are stiffer than 1 kPa and softer than diamond (1.2 TPa).
+  const bool absurd = (m.rho > 0 && (m.rho < 1 || m.rho > 3e4)) || m.E < 1e3 || m.E > 2e12;
+  return !absurd ? ""
+                 : fmt::format(
+                       "E = {:g}, rho = {:g} is no material in Pa and kg/m^3; are the units mixed up "
+                       "(N, mm, t give Hz as well, but say so to yourself)?",
+                       m.E, m.rho);
+}
+
 std::vector<std::string> suspicions(const Mesh& mesh) {
   std::vector<std::string> result;
   if (std::string inverted = inverted_corners(mesh); !inverted.empty()) result.push_back(std::move(inverted));
@@ -273,14 +283,8 @@ std::vector<std::string> suspicions(const Mesh& mesh) {
         fmt::format("{} pairs of nodes lie at one place and nothing joins them: the mesh is open there "
                     "(merge them if it should not be)",
                     twins));
-  // Solids of technology weigh 1 to 23 000 kg/m^3 and are stiffer than 1 kPa and softer than diamond (1.2 TPa).
   const auto judge = [&result](const std::string& where, const Material& m) {
-    const bool absurd = (m.rho > 0 && (m.rho < 1 || m.rho > 3e4)) || m.E < 1e3 || m.E > 2e12;
-    if (absurd)
-      result.push_back(
-          fmt::format("{}: E = {:g}, rho = {:g} is no material in Pa and kg/m^3; are the units mixed up "
-                      "(N, mm, t give Hz as well, but say so to yourself)?",
-                      where, m.E, m.rho));
+    if (const std::string odd = suspicion(m); !odd.empty()) result.push_back(where + ": " + odd);
   };
   for (const SolidProperty& property : mesh.solid_properties) judge("\"" + property.name + "\"", property.material);
   for (size_t i = 0; i < mesh.beam_properties.size(); ++i) {

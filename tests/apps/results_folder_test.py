@@ -376,6 +376,24 @@ class InPlace(Case):
         self.assert_exit(INPUT, result)
         self.assertEqual({f: (out / f).read_bytes() for f in os.listdir(out)}, before)
 
+    def test_a_state_goes_on_in_the_same_bodies_and_joints(self):
+        out, scene = self.folder / "out", self.folder / "changed.toml"
+        slew = (cli.MESHES / "panel-slew.toml").read_text()
+        run = lambda text, *more: scene.write_text(text) and flexboom("run", scene, "--no-budget", *more)
+        self.assert_exit(OK, run(slew, "--duration", "0.2", "--out", out))
+        go_on = ("--duration", "0.3", "--continue", out, "--out", self.folder / "later")
+        self.assertNotIn("another one", run(slew, *go_on).stderr)
+        thicker = re.sub(r"height = [0-9.]+", "height = 0.03", slew)
+        self.assertNotEqual(thicker, slew)
+        result = run(thicker, *go_on)
+        self.assert_exit(OK, result)
+        self.assertIn("is another one in", result.stderr)
+        slider = re.sub(r'kind = "hinge"', 'kind = "slider"', slew)
+        self.assertNotEqual(slider, slew)
+        result = run(slider, *go_on)
+        self.assert_exit(INPUT, result)
+        self.assertIn("and a slider here", result.stderr)
+
 
 class Changed(Case):
     """States that were changed by hand."""

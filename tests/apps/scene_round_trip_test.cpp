@@ -114,7 +114,7 @@ void expect_same_settings(const Scene& a, const Scene& b) {
   EXPECT_EQ(a.orbit->J2, b.orbit->J2);
 }
 
-// Warnings are about what was repaired; a scene that is written out has been repaired.
+// Most warnings are about what was repaired; a scene that is written out has been repaired. Others say what is odd.
 void expect_round_trip(const Scene& scene) {
   const std::string text = to_toml(scene);
   const Scene again = parse_scene(text, "again.toml");
@@ -123,7 +123,8 @@ void expect_round_trip(const Scene& scene) {
   for (size_t i = 0; i < scene.bodies.size(); ++i) expect_same(scene.bodies[i], again.bodies[i]);
   ASSERT_EQ(scene.hinges.size(), again.hinges.size());
   for (size_t i = 0; i < scene.hinges.size(); ++i) expect_same(scene.hinges[i], again.hinges[i]);
-  EXPECT_TRUE(again.warnings.empty());
+  for (const std::string& w : again.warnings)
+    EXPECT_NE(std::ranges::find(scene.warnings, w), scene.warnings.end()) << w;
   EXPECT_EQ(text, to_toml(again));
 }
 

@@ -227,6 +227,14 @@ TEST(TreeScene, TurnsAreReadCheckedAndWrittenBack) {
   }
 }
 
+TEST(TreeScene, AWheelIsFixedToMaterial) {
+  const std::string wheel =
+      "[[wheels]]\nname = \"wheel\"\nbody = \"boom\"\naxis = [0, 0, 1]\ninertia = 1e-3\ntorque = \"sin(t)\"\n";
+  EXPECT_EQ(fault_of(swing_on_joints + wheel), "");
+  const std::string moves = with(swing_on_joints, "modes = 1", "modes = 1\nbasis = \"mean-axis\"") + wheel;
+  EXPECT_NE(fault_of(moves).find("wheels[0].body: is \"boom\", and a wheel is fixed to the frame"), std::string::npos);
+}
+
 TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
   const std::string good = full_tree;
   EXPECT_EQ(fault_of(good), "");
@@ -268,6 +276,11 @@ TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
       {"gravity = [0, 0, -9.81]", "orbit = { eccentricity = 1 }", "orbit.eccentricity: is 1; it must lie in [0, 1)"},
       {"mass = 8.5", "mass = -8.5", "bodies[0].mass: is -8.5 kg"},
       {"stiffening = \"on\"", "stiffening = \"on\"\nstructure = \"eq14\"", "has none; use \"beam\""},
+      {"\"2*sin(t)\"", "\"0 < t < 1\"", "is 0 or 1 and is compared again; write (a < t) * (t < b)"},
+      {"\"0.1*t^2\", 0.2", "\"0.1*(t > 0)\", 0.2", "motion: jumps by 0.1 at t = 0 s; a joint cannot"},
+      {"start_attitude = [0.6, 0.8, 0, 0]", "start_attitude = [0.6, 0.8, 0, 0]\nrest = 0.1",
+       "rest: a spherical joint has none"},
+      {"\"lift.length\"", "\"lift.length 5\"", "accuracy.outputs: is 'lift.length 5', and an accuracy is at most 0.1"},
       {"at = { body = \"arm\", marker = \"tip\" }", "at = { body = \"arm\", point = [0.1, 0, 0] }",
        "loads[0].at.point: is 0.1 m along the boom, and a point moves with the root alone; give a marker, \"root\""},
       {"b = { body = \"ground\", point = [1, 1, 1] }", "b = { body = \"ball\", point = [1, 1, 1] }",

@@ -105,6 +105,16 @@ TEST(Warnings, OfPerCent) {
   }
 }
 
+TEST(Warnings, OfWhatIsMostLikelyMeantOtherwise) {
+  const auto warnings = [](const std::string& text) { return parse_scene(text, "x.toml").warnings; };
+  const std::string ramp = swing_on_joints + "drive = { time = [0, 0.2, 0.21, 1], value = [0, 0, 1, 1]";
+  EXPECT_TRUE(any_has(warnings(ramp + " }\n"), "drive of joint hinge: its cubic is "));
+  EXPECT_TRUE(warnings(ramp + ", interpolation = \"linear\" }\n").empty());
+  const std::string slit = with(swing_on_joints, "modes = 1", "modes = 1\nsolid = { slit = 1e-4 }");
+  EXPECT_TRUE(any_has(warnings(slit), "body boom: its slit is one of structure = \"solid\""));
+  EXPECT_TRUE(any_has(warnings(with(swing_on_joints, "E = 70e9", "E = 70")), "is no material in Pa and kg/m^3"));
+}
+
 TEST(Warnings, OfKilometresAndDegrees) {
   const std::string joint = swing_on_joints + "rest = 90\n";
   EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: has the rest of its spring at 90 rad"));
