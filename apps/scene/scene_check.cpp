@@ -308,8 +308,8 @@ void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
     if (b.is_boom() && b.structure != "solid" && b.solid.slit > 0)
       warnings.push_back(
           fmt::format("body {}: its slit is one of structure = \"solid\"; a {} has none", b.name, b.structure));
-    for (const BeamSegment& segment : b.is_boom() ? b.geometry.segments : std::vector<BeamSegment>{})
-      if (const std::string odd = suspicion(segment.material); !odd.empty())
+    for (const BeamSegment& segment : b.geometry.segments)
+      if (const std::string odd = suspicion(segment.material); b.is_boom() && !odd.empty())
         warnings.push_back(fmt::format("body {}: {}", b.name, odd));
     const double ratio = b.damping.name == "loss-factor" ? b.damping.value / 2 : b.damping.value;
     if (ratio > 1)  // of critical damping

@@ -254,9 +254,12 @@ class TreeCheck {
       return;  // a fault of its own
     }
     const double near = 1e-9 * scene_.duration;
-    double largest = 0;
-    for (int i = 0; i <= looks; ++i)
-      largest = std::max(largest, std::abs(course.function.value(scene_.duration * i / looks)));
+    double largest = 0, fastest = 0;
+    for (int i = 0; i <= looks; ++i) {
+      const double t = scene_.duration * i / looks;
+      largest = std::max(largest, std::abs(course.function.value(t)));
+      fastest = std::max(fastest, std::abs(course.function.rate(t)));
+    }
     for (const auto& [end, inside] : {std::pair(0.0, near), std::pair(scene_.duration, scene_.duration - near)}) {
       const double step = course.function.value(inside) - course.function.value(end);
       const double steepest = std::max(std::abs(course.function.rate(inside)), std::abs(course.function.rate(end)));
@@ -264,9 +267,6 @@ class TreeCheck {
         return faults_.add(path,
                            fmt::format("jumps by {:.4g} at t = {:.6g} s; a joint cannot, it needs a ramp", step, end));
     }
-    double fastest = 0;
-    for (int i = 0; i <= looks; ++i)
-      fastest = std::max(fastest, std::abs(course.function.rate(scene_.duration * i / looks)));
     for (const double t : course.corners) {
       if (!(t > near && t < scene_.duration - near)) continue;
       const auto [before, after] = std::pair(course.function.rate(t - near), course.function.rate(t + near));
