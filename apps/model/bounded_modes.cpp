@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <variant>
 
@@ -98,9 +99,17 @@ FrequencyBounds bounds_of(const BoundedModes& of, const ModalBasis& other, doubl
   return r;
 }
 
-/// Goes on to finer meshes until the accuracy is met, `most` steps at most. Where there is not one, the bounds are from
-/// the mesh one step coarser.
-BoundedModes climb(BoundedModes here, int most, double fall, const EigenOptions& options, int threads) {
+double worst(const BoundedModes& m) { return m.bounds.worst(m.basis.rigid_freedoms); }
+
+/// How far to go on to finer meshes.
+struct Steps {
+  int most = 0;
+  double hope = std::numeric_limits<double>::infinity();  // largest bound from which to go on, in accuracies
+};
+
+/// Goes on to finer meshes until the accuracy is met. Where there is not one, or no hope in it, the bounds are from the
+/// mesh one step coarser.
+BoundedModes climb(BoundedModes here, Steps allowed, double fall, const EigenOptions& options, int threads) {
   const Model start = here.model;
   const auto bound_by_coarser = [fall](BoundedModes& m, const BoundedModes& coarser, double seconds) {
     m.bounds = bounds_of(m, coarser.basis, (1 - fall) / fall);
@@ -115,13 +124,13 @@ BoundedModes climb(BoundedModes here, int most, double fall, const EigenOptions&
       return here;
     }
     here.bounds = bounds_of(here, next->basis, 1 - fall);
-    if (here.met() == true || steps == most) {
+    if (here.met() == true || steps == allowed.most) {
       here.bound_seconds += seconds_of(*next);
       return here;
     }
     bound_by_coarser(*next, here, here.bound_seconds);
     here = *std::move(next);
-    if (here.met() == true) return here;
+    if (here.met() == true || !(worst(here) <= allowed.hope * *here.accuracy)) return here;
   }
 }
 
@@ -159,18 +168,30 @@ BoundedModes bounded_modes(Model model, const EigenOptions& options, int threads
   if (!first.model.body) return first;
   first.bounds.how = "there is no other mesh that is small enough to be compared with";
   const double fall = slowest_fall(*first.model.body);
-  if (!refine) return climb(std::move(first), 0, fall, options, threads);
+  if (!refine) return climb(std::move(first), {}, fall, options, threads);
+  constexpr Steps few = {1, 3};
   Model start = first.model;
-  BoundedModes here = climb(std::move(first), 1, fall, options, threads);
-  if (here.met() == true) return here;
+  VectorXd omega = first.basis.omega;
+  const auto order_of = [](const Model& m) { return chosen(m.body->geometry, m.body->solid).order; };
+  BoundedModes best = climb(std::move(first), few, fall, options, threads);
+  const auto attempt = [&](BoundedModes from, Steps steps) {
+    BoundedModes other = climb(std::move(from), steps, fall, options, threads);
+    if (other.met() == true || std::isnan(worst(best)) || worst(other) < worst(best)) std::swap(best, other);
+    best.bound_seconds += other.bound_seconds + seconds_of(other);
+  };
+  if (best.met() != true && order_of(start) < least_order_of_tuning) {
+    start = with_order(std::move(start), least_order_of_tuning);
+    BoundedModes higher = modes_of(start, options, threads);
+    omega = higher.basis.omega;
+    attempt(std::move(higher), few);
+  }
+  if (best.met() == true) return best;
   Stopwatch clock;
-  Model better = tuned(std::move(start), here.basis.rigid_freedoms, *here.accuracy, options, threads);
-  const double tuning = clock.seconds();
-  BoundedModes again = climb(modes_of(std::move(better), options, threads), most_steps, fall, options, threads);
-  const auto worst = [](const BoundedModes& m) { return m.bounds.worst(m.basis.rigid_freedoms); };
-  if (again.met() != true && !(worst(again) < worst(here))) std::swap(here, again);
-  again.bound_seconds += tuning + here.bound_seconds + seconds_of(here);
-  return again;
+  std::optional<Model> better =
+      tuned(std::move(start), std::move(omega), best.basis.rigid_freedoms, *best.accuracy, options, threads);
+  best.bound_seconds += clock.seconds();
+  if (better) attempt(modes_of(*std::move(better), options, threads), {most_steps});
+  return best;
 }
 
 }  // namespace flexboom

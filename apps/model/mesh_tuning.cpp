@@ -52,22 +52,25 @@ double change(const VectorXd& a, const VectorXd& b, int rigid_freedoms) {
 
 }  // namespace
 
-Model tuned(Model model, int rigid_freedoms, double accuracy, const EigenOptions& options, int threads) {
+Model with_order(Model model, int order) {
+  model.body->solid.order = order;
+  return refined(model, 0);
+}
+
+std::optional<Model> tuned(Model model, VectorXd omega, int rigid_freedoms, double accuracy,
+                           const EigenOptions& options, int threads) {
   constexpr int most_rounds = 4;
   constexpr double share = 1.0 / 3;  // of the accuracy, that a direction may keep
-  constexpr int least_order = 4;     // thin walls and long elements are dear with less
   SolidOptions& solid = model.body->solid;
-  solid.order = std::max(least_order, chosen(model.body->geometry, solid).order);
   solid = chosen(model.body->geometry, solid);
-  model = refined(model, 0);
-  VectorXd here = frequencies(model, options, threads);
+  bool any = false;
   std::vector<Direction> tried(mesh_sizes.begin(), mesh_sizes.end());
   for (int round = 0; round < most_rounds && !tried.empty(); ++round) {
     std::vector<std::pair<double, Direction>> effective;
     for (const Direction& d : tried) {
       const Model finer = finer_in(model, d);
       if (finer.mesh.nodes.cols() == model.mesh.nodes.cols() || !is_bearable(finer.mesh)) continue;
-      const double moved = change(here, frequencies(finer, options, threads), rigid_freedoms);
+      const double moved = change(omega, frequencies(finer, options, threads), rigid_freedoms);
       if (moved > share * accuracy) effective.emplace_back(moved, d);
     }
     std::ranges::sort(effective, [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -76,11 +79,12 @@ Model tuned(Model model, int rigid_freedoms, double accuracy, const EigenOptions
       Model next = finer_in(model, d);
       if (!refined_if_bearable(next, 1)) continue;  // nothing could be compared with it
       model = std::move(next);
+      any = true;
       tried.push_back(d);
     }
-    if (!tried.empty()) here = frequencies(model, options, threads);
+    if (!tried.empty()) omega = frequencies(model, options, threads);
   }
-  return model;
+  return any ? std::optional(std::move(model)) : std::nullopt;
 }
 
 }  // namespace flexboom

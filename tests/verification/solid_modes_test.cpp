@@ -90,10 +90,13 @@ TEST(SlowEdges, AMeshIsRefinedWhereItsFrequenciesAskForIt) {
   EigenOptions options;
   options.num_modes = 5;
   options.backend = "auto";
-  const Model better = tuned(model, 0, 1e-2, options, 1);
-  EXPECT_EQ(better.body->solid.grading.sectors, 2);
-  EXPECT_EQ(better.body->solid.grading.rings, 2);
-  const std::vector<double> hz = hz_of(modes_of(better.mesh, better.clamp, options.num_modes));
+  const Model start = with_order(model, least_order_of_tuning);
+  const std::optional<Model> better =
+      tuned(start, modes_of(start.mesh, start.clamp, options.num_modes).omega, 0, 1e-2, options, 1);
+  ASSERT_TRUE(better);
+  EXPECT_EQ(better->body->solid.grading.sectors, 2);
+  EXPECT_EQ(better->body->solid.grading.rings, 2);
+  const std::vector<double> hz = hz_of(modes_of(better->mesh, better->clamp, options.num_modes));
   const std::vector<double> reference = {5827.183, 5827.183, 14890.436, 15553.834, 15553.834};
   for (size_t k = 0; k < reference.size(); ++k) EXPECT_NEAR(hz[k] / reference[k], 1, 1e-3) << k;
   EXPECT_GT(hz_of(modes_of(model.mesh, model.clamp, options.num_modes))[4] / reference[4], 1.02);
