@@ -2,9 +2,13 @@
 
 #include "apps/model/prepared_body.hpp"
 #include "apps/model/static_shapes.hpp"
+#include "apps/simulate/drives.hpp"
 #include "fem/base/check.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -12,6 +16,38 @@
 namespace flexboom {
 
 namespace {
+
+constexpr int most_beyond = 64, most_for_tones = 96;  // modes of a body
+
+/// Of the modes of a body, in their order [rad/s].
+std::vector<double> frequencies(const PreparedBody& p) {
+  std::vector<double> w;
+  for (int k = 0; k < p.coordinates_of_modes(); ++k) w.push_back(std::sqrt(p.body.Ke(k, k) / p.body.Me(k, k)));
+  return w;
+}
+
+/// Modes to show what a tone does: so far beyond it, for what holds a body shifts its frequencies.
+constexpr double beyond_a_tone = 1.3;
+
+/// The frequencies of the modes of a body: the lowest, and up to which it has all [rad/s].
+struct Span {
+  double lowest = 0, highest = 0;
+
+  /// How far the modes must reach for the drives of their scene, where they do not show these [rad/s]; else 0.
+  double wanted(const DriveSpectra& drives) const {
+    return highest > 0 ? beyond_a_tone * drives.fastest_beyond(lowest, highest / beyond_a_tone) : 0;
+  }
+};
+
+Span span_of(BodyScene b, const std::filesystem::path& keep, const RunHooks& hooks) {
+  const std::vector<int> kept = std::exchange(b.shapes, {});
+  const std::vector<double> w = frequencies(prepared(b, 0, keep, hooks));
+  if (w.empty()) return {};
+  Span span{std::ranges::min(w), std::ranges::max(w)};
+  for (size_t k = 0; k < w.size() && !kept.empty(); ++k)
+    if (std::ranges::find(kept, static_cast<int>(k) + 1) == kept.end()) span.highest = std::min(span.highest, w[k]);
+  return span;
+}
 
 std::map<std::string, int> kinds_of(const PreparedBody& p) {
   std::map<std::string, int> kinds;
@@ -37,12 +73,11 @@ std::vector<int> places_of(const BodyScene& b, const PreparedBody& whole, const 
 }
 
 /// The lowest modes of all directions: the `highest` that is kept, and enough beyond those of each kind in `kinds`.
-/// Those of beams go on until some stretch and some twist; where none do, static shapes stand for them.
-/// What lies beyond `resolved` the elements do not know.
+/// Those of beams go on until some stretch and some twist; where none do, static shapes stand for them. They go on to
+/// the frequency `reach`, too. What lies beyond `resolved` the elements do not know.
 BodyScene with_modes_beyond(BodyScene b, int highest, int resolved, const ModesBeyond& more,
-                            const std::map<std::string, int>& kinds, const std::filesystem::path& keep,
+                            const std::map<std::string, int>& kinds, double reach, const std::filesystem::path& keep,
                             const RunHooks& hooks) {
-  constexpr int most = 64;
   b.shapes.clear();
   b.directions = "all";
   for (int i = 1;; i *= 2) {
@@ -50,18 +85,22 @@ BodyScene with_modes_beyond(BodyScene b, int highest, int resolved, const ModesB
     b = with_modes(std::move(b), wanted, keep, hooks);
     const PreparedBody all = prepared(b, 0, keep, hooks);
     std::map<std::string, int> count = kinds_of(all);
+    const std::vector<double> w = frequencies(all);
     const bool enough =
+        (reach == 0 || (!w.empty() && std::ranges::max(w) >= reach)) &&
         std::ranges::all_of(kinds, [&](const auto& k) { return count[k.first] >= k.second + more.of(k.second); });
     const std::vector<std::string> statics = static_shapes_beside(all.body, b.clamp);
-    const bool has_more = b.modes == wanted && wanted < std::min(highest + most, resolved);
+    const bool has_more =
+        b.modes == wanted && wanted < std::min(highest + (reach > 0 ? most_for_tones : most_beyond), resolved);
     if (has_more && (!enough || (b.structure == "beam" && !statics.empty()))) continue;
     return with_static_shapes(b, statics);
   }
 }
 
-/// Its own modes and the lowest beside them: half as many of kinds that it has not.
-BodyScene with_more_of_each_kind(const BodyScene& b, const ModesBeyond& more, const std::filesystem::path& keep,
-                                 const RunHooks& hooks) {
+/// Its own modes and the lowest beside them: half as many of kinds that it has not, and all up to the frequency
+/// `reach`.
+BodyScene with_more_of_each_kind(const BodyScene& b, const ModesBeyond& more, double reach,
+                                 const std::filesystem::path& keep, const RunHooks& hooks) {
   const bool in_plane = b.directions != "all";
   BodyScene own = b;
   own.shapes.clear();
@@ -69,17 +108,19 @@ BodyScene with_more_of_each_kind(const BodyScene& b, const ModesBeyond& more, co
   const PreparedBody whole = prepared(own, 0, keep, hooks);
   const int dofs = b.modes > 0 ? whole.dofs : prepared(with_modes(own, 2, keep, hooks), 0, keep, hooks).dofs;
   const int resolved = dofs > 0 ? dofs / 2 : std::numeric_limits<int>::max();  // a closed form has all
-  BodyScene richer = with_modes_beyond(b, in_plane ? 2 * b.modes : b.modes, resolved, more, kinds, keep, hooks);
+  BodyScene richer = with_modes_beyond(b, in_plane ? 2 * b.modes : b.modes, resolved, more, kinds, reach, keep, hooks);
   const PreparedBody all = prepared(richer, 0, keep, hooks);
   const std::vector<int> places = places_of(b, whole, all);
   std::map<std::string, int> beside;
+  const std::vector<double> w = frequencies(all);
   for (int k = 1; k <= all.coordinates_of_modes(); ++k) {
     const std::string& kind = all.body.coordinates[static_cast<size_t>(k) - 1].kind;
     const auto own_kind = kinds.find(kind);
     const int of_kind = own_kind != kinds.end() ? more.of(own_kind->second)
                         : kinds.empty()         ? more.of(0)
                                                 : more.of(0) / 2;
-    if (std::ranges::find(places, k) != places.end() || ++beside[kind] <= of_kind) richer.shapes.push_back(k);
+    const bool is_next = std::ranges::find(places, k) != places.end() || ++beside[kind] <= of_kind;
+    if (is_next || w[static_cast<size_t>(k) - 1] <= reach) richer.shapes.push_back(k);
   }
   return richer;
 }
@@ -102,24 +143,60 @@ BodyScene with_modes(BodyScene b, int wanted, const std::filesystem::path& keep,
   return b;
 }
 
+namespace {
+
+/// A boom with more modes, up to the frequency `reach` at least, if there are so many.
+BodyScene with_more_modes(const BodyScene& b, const ModesBeyond& more, double reach, const std::filesystem::path& keep,
+                          const RunHooks& hooks) {
+  if (b.basis.name == "clamped") return with_more_of_each_kind(b, more, reach, keep, hooks);
+  const int per_plane = b.directions == "all" ? (b.modes + 1) / 2 : b.modes;
+  BodyScene richer = b;
+  richer.directions = "all";
+  richer.shapes.clear();
+  for (int beside = more.of(per_plane);; beside *= 2) {
+    richer.modes = 2 * (per_plane + beside);
+    if (reach == 0) return richer;
+    richer = with_modes(std::move(richer), richer.modes, keep, hooks);
+    const bool is_last = richer.modes < 2 * (per_plane + beside) || 2 * beside >= most_for_tones;
+    if (is_last || std::ranges::max(frequencies(prepared(richer, 0, keep, hooks))) >= reach) return richer;
+  }
+}
+
+}  // namespace
+
 Scene with_more_modes(Scene scene, const ModesBeyond& more, const RunHooks& hooks) {
+  const DriveSpectra drives(scene);
   for (BodyScene& b : scene.bodies) {
     if (b.richer && b.richer->more_modes) {
       b.reduced = {b.richer, &*b.richer->more_modes};
       b.richer = nullptr;  // of those modes there is nothing finer
     }
     if (b.structure == "rigid" || !b.is_boom()) continue;
-    if (b.basis.name == "clamped") {
-      b = with_more_of_each_kind(b, more, scene.bodies_kept_in, hooks);
-    } else {
-      const int per_plane = b.directions == "all" ? (b.modes + 1) / 2 : b.modes;
-      b.modes = 2 * (per_plane + more.of(per_plane));
-      b.directions = "all";
-      b.shapes.clear();
+    BodyScene richer = with_more_modes(b, more, 0, scene.bodies_kept_in, hooks);
+    const double reach = drives.empty() ? 0 : span_of(richer, scene.bodies_kept_in, hooks).wanted(drives);
+    if (reach > 0) {
+      if (b.structure == "beam") b.geometry = refined(b.geometry, 2);  // a resonance needs the right frequency
+      richer = with_more_modes(b, more, reach, scene.bodies_kept_in, hooks);
     }
+    b = std::move(richer);
     b = with_static_shapes(b, static_shapes_of_loads(scene, b));
   }
   return scene;
+}
+
+void require_drives_shown(const Scene& scene, const RunHooks& hooks) {
+  const DriveSpectra drives(scene);
+  if (drives.empty()) return;
+  for (const BodyScene& b : scene.bodies) {
+    if (b.rigid || b.structure == "rigid") continue;
+    const Span span = span_of(b, scene.bodies_kept_in, hooks);
+    const double tone = span.wanted(drives) / beyond_a_tone;
+    if (tone > 0)
+      throw InputError(
+          fmt::format("a function of time moves vibrations of body {} at up to {:.4g} rad/s, which takes modes up to "
+                      "{:.4g} rad/s to show, and those that are tried end at {:.4g} rad/s",
+                      b.name, tone, beyond_a_tone * tone, span.highest));
+  }
 }
 
 Scene without_kinds(Scene scene, const StillKinds& still, const RunHooks& hooks) {

@@ -130,9 +130,10 @@ void Planner::note_still(const std::vector<Candidate>& list) {
     if (most <= unmoved * list.front().displacement && of.second != "other") still_[of.first].insert(of.second);
 }
 
-void Planner::note_shown(const Scene& planned, const RunHooks& hooks) {
+void Planner::note_shown(Scene& planned, const RunHooks& hooks) {
   const Scene more = with_more_modes(planned, {}, hooks);
   for (const size_t i : open_) {
+    planned.bodies[i].geometry = more.bodies[i].geometry;
     if (planned.bodies[i].basis.name != "clamped" || planned.bodies[i].directions != "all") continue;
     shown_[planned.bodies[i].name] = more.bodies[i];
   }

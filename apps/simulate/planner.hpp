@@ -61,8 +61,9 @@ class Planner {
   bool is_hopeless_front(const OutputErrors&, double tolerance) const;
   Scene with_first(const Scene& all, const std::vector<Candidate>&, size_t count) const;
 
-  /// Modes beside those of the plan that have shown its truncation: candidates, too, from then on.
-  void note_shown(const Scene& planned, const RunHooks&);
+  /// Modes beside those of the plan that have shown its truncation: candidates, too, from then on. The plan gets the
+  /// elements that these had.
+  void note_shown(Scene& planned, const RunHooks&);
 
   std::vector<size_t> open_;                // bodies of the scene
   std::map<std::string, BodyScene> shown_;  // with these modes

@@ -4,6 +4,7 @@
 
 #include "apps/scene/scene_keys.hpp"
 #include "apps/scene/scene_orbit.hpp"
+#include "apps/simulate/drives.hpp"
 #include "dynamics/model/time_function.hpp"
 #include "dynamics/numerics/expression.hpp"
 #include "fem/base/check.hpp"
@@ -13,7 +14,6 @@
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -258,50 +258,20 @@ FlightState end_of(const Run& run, const Scene& scene, double time, const Vector
   return end;
 }
 
-namespace {
-
-/// Times at which functions of time are looked at before a flight: at each output and between, and in each row of a
-/// table.
-int samples_of(const Scene& scene, const std::vector<const CourseScene*>& courses) {
-  constexpr double most = 1 << 20;
-  double samples = std::max(4096.0, 4 * scene.duration / scene.output_step);
-  for (const CourseScene* c : courses)
-    for (size_t i = 1; c->table && i < c->table->time.size(); ++i)
-      samples = std::max(samples, 2 * scene.duration / (c->table->time[i] - c->table->time[i - 1]));
-  return static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::min(samples, most))));
-}
-
-}  // namespace
-
 void set_corners(const Scene& scene, IntegratorOptions& o) {
   const auto add_corners = [&](const std::vector<double>& corners) {
     const double round_off = 2e-14 * scene.duration;
     for (const double t : corners)
       if (t > round_off && t < scene.duration - round_off) o.corners.push_back(t);
   };
-  std::vector<const CourseScene*> courses, motions;
-  const auto add = [](const CourseScene& c, std::vector<const CourseScene*>& list) {
-    const bool is_number = !c.expression.empty() && c.expression.find('t') == std::string::npos;
-    if (c.given() && !is_number) list.push_back(&c);
-  };
-  for (const JointScene& j : scene.joints) {
-    add(j.drive, courses);
-    for (const CourseScene& c : j.motion) add(c, motions);
-  }
-  for (const LoadScene& l : scene.loads)
-    for (size_t i = 0; i < 3; ++i) add(l.force[i], courses), add(l.torque[i], courses);
-  for (const WheelScene& w : scene.wheels) add(w.torque, courses);
   for (const WheelTurn& t : turns_of(scene.turns)) add_corners(rest_to_rest(t.manoeuvre).corners);
-  const size_t loads = courses.size();
-  courses.insert(courses.end(), motions.begin(), motions.end());
-  const int samples = samples_of(scene, courses);
+  const std::vector<Drive> drives = drives_of(scene);
+  const int samples = samples_of(scene, drives);
   std::vector<std::function<double(double)>> functions;
-  for (size_t i = 0; i < courses.size(); ++i) {
-    const CourseScene& c = *courses[i];
-    const TimeCourse course = course_of(c, scene.duration);
-    add_corners(course.corners);
-    if (!c.expression.empty()) add_corners(Expression(c.expression).corners(0, scene.duration, samples));
-    if (!c.manoeuvre) functions.push_back(i < loads ? course.function.value : course.function.acceleration);
+  for (const Drive& d : drives) {
+    add_corners(d.course.corners);
+    if (!d.given->expression.empty()) add_corners(Expression(d.given->expression).corners(0, scene.duration, samples));
+    if (!d.given->manoeuvre) functions.push_back(d.felt());
   }
   constexpr double of_tolerance = 1e-3;
   o.step_ends = smooth_pieces(functions, scene.duration, samples, of_tolerance * scene.step_tolerance());

@@ -1,0 +1,104 @@
+// What functions of time do to vibrations that a model leaves out.
+
+#include "apps/simulate/drives.hpp"
+#include "apps/simulate/error_budget.hpp"
+#include "tests/apps/run_testing.hpp"
+#include "tests/apps/scene_testing.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+namespace flexboom {
+namespace {
+
+// A slender boom on a slider. Its frequencies are those of a clamped Euler-Bernoulli beam.
+const std::string shaken = R"toml(format = "flexboom-scene-1"
+name = "shaken"
+duration = 2.0
+output_step = 0.01
+[accuracy]
+tolerance = 1e-3
+outputs = ["boom.tip"]
+[[bodies]]
+name = "boom"
+theory = "euler-bernoulli"
+rotary_inertia = false
+modes = 3
+damping = { rule = "modal", value = 0.002 }
+[[bodies.segments]]
+shape = "general"
+A = 2e-5
+Iy = 5e-10
+Iz = 1e-10
+J = 1e-10
+length = 2.0
+material = { E = 70e9, nu = 0.3, rho = 2700 }
+[[joints]]
+name = "shaker"
+kind = "slider"
+a = { x = [1, 0, 0], z = [0, 1, 0] }
+b = { body = "boom", marker = "root", x = [1, 0, 0], z = [0, 1, 0] }
+motion = "0.1*(1-cos(0.7*t))"
+)toml";
+
+std::string shaken_by(const std::string& motion) { return with(shaken, "0.1*(1-cos(0.7*t))", motion); }
+
+/// [rad/s]
+double clamped_frequency(int n) {
+  const double beta = (n - 0.5) * std::numbers::pi / 2.0;  // over the length; good to 1e-10 from n = 8
+  return beta * beta * std::sqrt(70e9 * 1e-10 / (2700 * 2e-5));
+}
+
+double fastest(const std::string& motion, double shown) {
+  return DriveSpectra(parse_scene(shaken_by(motion), "shaken.toml")).fastest_beyond(10, shown);
+}
+
+TEST(DriveSpectra, AToneBeyondTheModesShownIsFound) {
+  EXPECT_NEAR(fastest("0.05*(1-cos(0.7*t))+1e-6*(1-cos(3000*t))", 300), 3000, 30);
+  EXPECT_NEAR(fastest("0.05*(1-cos(0.7*t))+1e-6*(1-cos(90*t))+1e-9*(1-cos(20000*t))", 300), 20000, 40);
+  EXPECT_EQ(fastest("0.05*(1-cos(0.7*t))+1e-6*(1-cos(3000*t))", 3100), 0);
+}
+
+// What the modes up to there show of these is a bound for the others.
+TEST(DriveSpectra, SlowMotionsPulsesAndCornersHaveNoTones) {
+  EXPECT_EQ(fastest("0.05*(1-cos(0.7*t))", 300), 0);
+  EXPECT_EQ(fastest("0.01*t^2", 300), 0);
+  EXPECT_EQ(fastest("0.001*(t-1)^3*(t>1)", 300), 0);
+  EXPECT_EQ(fastest("1e-3*exp(-((t-1)/0.003)^2)", 300), 0);
+}
+
+// A resonance with the tenth mode, of which three modes and the next four know nothing. Reference: 14 modes.
+TEST(TruncationOfATone, ReachesTheModesThatItMoves) {
+  const std::string text = shaken_by(fmt::format("0.05*(1-cos(0.7*t))+5e-7*(1-cos({:.9f}*t))", clamped_frequency(10)));
+  Scene scene = parse_scene(text, "shaken.toml");
+  const RunResult r = run_scene(scene, {});
+  Scene full = scene;
+  full.error_budget = false, full.tolerance = 1e-6, full.bodies[0].modes = 14;
+  const OutputTable reference = without_coordinates(run_scene(full, {}).outputs);
+  const double truth =
+      largest(compare_outputs(without_coordinates(r.outputs), reference, scene.outputs, floors_of(scene, r.bodies)));
+  EXPECT_GT(truth, 1e-2);
+  EXPECT_GT(r.budget.truncation, 0.8 * truth);
+  EXPECT_LT(r.budget.truncation, 3 * truth);
+  scene.bodies[0].modes_auto = true;
+  const RunResult planned = run_scene(scene, {});
+  EXPECT_TRUE(planned.budget.within(scene.tolerance));
+  const double left = largest(
+      compare_outputs(without_coordinates(planned.outputs), reference, scene.outputs, floors_of(scene, r.bodies)));
+  EXPECT_LT(left, scene.tolerance);
+}
+
+// A mode that the elements do not know, or too many of them, is no mode that is shown.
+TEST(TruncationOfATone, BeyondAllModesThatAreTriedIsNotMeasured) {
+  const std::string text = shaken_by("0.05*(1-cos(0.7*t))+1e-10*(1-cos(300000*t))");
+  const RunResult r = run_scene(parse_scene(with(text, "duration = 2.0", "duration = 0.05"), "shaken.toml"), {});
+  EXPECT_TRUE(std::isnan(r.budget.truncation));
+  EXPECT_TRUE(any_has(r.warnings, "truncation not measured: a function of time moves vibrations of body boom"));
+}
+
+}  // namespace
+}  // namespace flexboom
