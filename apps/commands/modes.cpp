@@ -131,7 +131,7 @@ void print_table(const BoundedModes& m, double total_seconds) {
                name_of(basis.kind[static_cast<size_t>(k)]));
   }
   const double worst = worst_bound(m);
-  print_note(basis.rigid_freedoms == basis.omega.size()
+  print_note(basis.rigid_freedoms >= basis.omega.size()
                  ? "errors of the mesh: none, all of these are rigid motions"
                  : fmt::format("errors of the mesh: {}, {}",
                                std::isnan(worst) ? "not known of every mode" : fmt::format("at most {:.1e}", worst),

@@ -10,6 +10,7 @@
 #include "fem/mesh/mesh.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -239,6 +240,37 @@ void warn_of_points(const Scene& scene, std::vector<std::string>& warnings) {
   for (const LoadScene& l : scene.loads) look("load " + l.name, l.at);
 }
 
+/// What is given and does nothing, for what it belongs to is not there.
+void warn_of_idle_keys(const Scene& scene, std::vector<std::string>& warnings) {
+  const auto idle = [&](const std::string& of, std::string_view keys, std::string_view why) {
+    warnings.push_back(fmt::format("{}: {} nothing, {}", of, keys, why));
+  };
+  for (const BodyScene& b : scene.bodies) {
+    if (!b.is_boom() || b.structure == "beam" || b.structure == "rigid") continue;
+    const BeamGeometry usual, &g = b.geometry;
+    std::vector<std::string_view> keys;
+    if (g.theory != usual.theory) keys.emplace_back("theory");
+    if (g.shear.name != usual.shear.name) keys.emplace_back("shear");
+    if (g.rotary_inertia != usual.rotary_inertia) keys.emplace_back("rotary_inertia");
+    if (g.order != usual.order) keys.emplace_back("order");
+    if (keys.empty()) continue;
+    idle("body " + b.name, fmt::format("{} {}", fmt::join(keys, ", "), keys.size() > 1 ? "do" : "does"),
+         fmt::format("structure is \"{}\" and has no beams", b.structure));
+  }
+  for (const JointScene& j : scene.joints) {
+    if (joint_type(j.kind).scalars == 1 && j.mechanism.threshold != 0 && !(j.mechanism.stop_stiffness > 0))
+      idle("joint " + j.name, "threshold does", "without stop_stiffness there is no stop");
+    if (joint_type(j.kind).scalars == 1 && j.mechanism.rest != 0 && !(j.mechanism.stiffness > 0))
+      idle("joint " + j.name, "rest does", "without stiffness there is no spring");
+    if (j.kind == JointKind::free && j.loads) idle("joint " + j.name, "loads does", "a free joint bears none");
+  }
+  for (const SpringScene& s : scene.springs)
+    if (s.stiffness == 0 && s.damping == 0) idle("spring " + s.name, "it does", "stiffness and damping are 0");
+  for (const LoadScene& l : scene.loads)
+    if (std::ranges::none_of(l.force, &CourseScene::given) && std::ranges::none_of(l.torque, &CourseScene::given))
+      idle("load " + l.name, "it does", "force and torque are missing");
+}
+
 /// A cubic through points that a ramp joins swings far beyond them.
 void warn_of_overshoot(const std::string& of, const CourseScene& course, std::vector<std::string>& warnings) {
   if (!course.table || course.table->interpolation != "cubic") return;
@@ -265,6 +297,7 @@ void warn_of_overshoot(const std::string& of, const CourseScene& course, std::ve
 
 void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
   warn_of_points(scene, warnings);
+  warn_of_idle_keys(scene, warnings);
   for (const JointScene& j : scene.joints) {
     warn_of_overshoot("drive of joint " + j.name, j.drive, warnings);
     for (const CourseScene& c : j.motion) warn_of_overshoot("motion of joint " + j.name, c, warnings);

@@ -105,8 +105,8 @@ void integrator_keys(Archive& a, Scene& s) {
         s.integrator_tolerance, integrator_tolerance);
   a.choice({"formulation", "", "coordinates"}, formulations, s.formulation);
   a.key({"settle", "",
-         "fraction of its largest rate below which a hinge rests at its stop; 0: never, negative: a hundredth of the "
-         "tolerance"},
+         "fraction of its largest rate below which a hinge rests at its stop; 0: not by its rate, negative: a "
+         "hundredth of the tolerance"},
         s.settle, settle);
   a.key({"rescale_at_events", "",
          "whether errors are relative to the motion since the last contact; not with multipliers"},
@@ -276,7 +276,8 @@ void spring_keys(Archive& a, SpringScene& s) {
 void load_keys(Archive& a, LoadScene& l) {
   a.key({"name", "", "of the load", required}, l.name, name);
   a.table({"at", "", "place that it acts on", required}, l.at, place_keys, "Place");
-  a.choice({"axes", "", "of the force and the torque"}, load_axes, l.inertial_axes);
+  a.choice({"axes", "", "of the force and the torque, those of the place or inertial ones"}, load_axes,
+           l.inertial_axes);
   a.key({"force", "N", "three functions of time", false, "zero"}, l.force);
   a.key({"torque", "N m", "three functions of time", false, "zero"}, l.torque);
 }

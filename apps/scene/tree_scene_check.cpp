@@ -148,11 +148,12 @@ class TreeCheck {
   }
 
   /// Where a function has its largest value between two times, if that goes on growing however near one looks. A look
-  /// that comes near to a pole by chance is the largest of the next ones, too.
+  /// that comes near to a pole by chance is the largest of the next ones, too. A fast sine that is zero at the first
+  /// looks grows at the next ones, and then no more.
   static std::optional<double> pole_of(const std::function<double(double)>& value, double from, double to) {
     constexpr int zooms = 10, by_chance = 4, looks = 16;
-    constexpr double of_a_peak = 1.5, of_a_pole = 1e4;
-    double first = 0, largest = 0, place = 0;
+    constexpr double of_a_peak = 1.5, of_a_pole = 100;
+    double first = 0, later = 0, largest = 0, place = 0;
     for (int zoom = 0; zoom < zooms; ++zoom) {
       const double step = (to - from) / looks;
       for (int i = 0; i <= looks; ++i) {
@@ -161,10 +162,13 @@ class TreeCheck {
         if (v > largest) largest = v, place = from + i * step;
       }
       if (zoom == 0) first = largest;
-      if (zoom == by_chance && largest < of_a_peak * first) return {};
+      if (zoom == by_chance) {
+        if (largest < of_a_peak * first) return {};
+        later = largest;
+      }
       from = place - step, to = place + step;
     }
-    return largest > of_a_pole * first ? std::optional(place) : std::nullopt;
+    return largest > of_a_pole * later ? std::optional(place) : std::nullopt;
   }
 
   void course(const std::string& path, const CourseScene& c) {

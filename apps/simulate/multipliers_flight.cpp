@@ -122,17 +122,27 @@ std::vector<std::string> warnings_of(const Scene& scene, const Multibody& bodies
   return warnings;
 }
 
-/// Where closing the loops moved a joint away from the start it was given.
+/// Where closing the loops moved a joint away from the start or the rate it was given.
 void note_moved_starts(const Scene& scene, const TreeState& asked, const TreeState& first,
                        std::vector<std::string>& notes) {
+  double fastest = 0;
+  for (const TreeState* state : {&asked, &first})
+    for (const JointState& j : state->joints)
+      for (const double rate : j.rate) fastest = std::max(fastest, std::abs(rate));
   for (size_t i = 0, of_tree = 0; i < scene.joints.size(); ++i) {
     const JointScene& j = scene.joints[i];
     if (j.closes_loop) continue;
     const JointState& wanted = asked.joints[of_tree++];
+    const JointState& closed = first.joints[i];
+    const auto moved = [&](double a, double b, double size) { return std::abs(a - b) > scene.tolerance * size; };
     for (size_t k = 0; k < wanted.coordinate.size(); ++k)
-      if (std::abs(first.joints[i].coordinate[k] - wanted.coordinate[k]) > scene.tolerance)
+      if (moved(closed.coordinate[k], wanted.coordinate[k], 1))
         notes.push_back(fmt::format("joint {}: starts at {:.6g}, not {:.6g}, so that the loops close", j.name,
-                                    first.joints[i].coordinate[k], wanted.coordinate[k]));
+                                    closed.coordinate[k], wanted.coordinate[k]));
+    for (size_t k = 0; k < std::min(wanted.rate.size(), j.start_rate.size()); ++k)
+      if (moved(closed.rate[k], wanted.rate[k], fastest))
+        notes.push_back(fmt::format("joint {}: starts at a rate of {:.6g}, not {:.6g}, so that the loops stay closed",
+                                    j.name, closed.rate[k], wanted.rate[k]));
   }
 }
 

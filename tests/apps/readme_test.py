@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """Runs README.md's `flexboom` commands, in their order, in a folder that holds nothing but the repository's meshes.
+Holds the errors that the worked example of meshes/README.md tells against those of a run.
 
 The argument is the program. Lines of `flexboom bench` are left out: they measure speed for minutes and need an idle machine.
 """
+import json
 import pathlib
 import re
 import shlex
@@ -65,6 +67,17 @@ def run(program, folder, arguments):
     return result.returncode == 0
 
 
+def worked_example(program, folder):
+    """Whether wing-satellite has the errors that meshes/README.md tells, to a fifth."""
+    row = re.search(r"^\| error budget \| (.*) \|$", (ROOT / "meshes" / "README.md").read_text(), re.M)
+    told = {part: float(size) for part, size in re.findall(r"(\w+) (\d\.\de-\d)", row[1])}
+    if not run(program, folder, ["run", "wing-satellite", "--quiet", "--out", "example"]):
+        return False
+    found = json.loads((folder / "example" / "summary.json").read_text())["error_budget"]
+    print("wing-satellite:", *(f"{part} {found[part]:.1e}, told {size:.1e};" for part, size in told.items()))
+    return len(told) == 4 and all(abs(found[part] / size - 1) < 0.2 for part, size in told.items())
+
+
 def main():
     found = [arguments for arguments in commands() if arguments[0] != "bench"]
     if len(found) < 10:
@@ -75,6 +88,7 @@ def main():
         (folder / "deck.inp").write_text(DECK)
         shutil.copy(ROOT / "meshes" / "two-link-arm.toml", folder / "my_scene.toml")
         good = [run(sys.argv[1], folder, arguments) for arguments in found]
+        good.append(worked_example(sys.argv[1], folder))
     return 0 if all(good) else 1
 
 

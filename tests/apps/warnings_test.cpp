@@ -115,6 +115,25 @@ TEST(Warnings, OfWhatIsMostLikelyMeantOtherwise) {
   EXPECT_TRUE(any_has(warnings(with(swing_on_joints, "E = 70e9", "E = 70")), "is no material in Pa and kg/m^3"));
 }
 
+TEST(Warnings, OfKeysThatDoNothing) {
+  const auto has = [](const std::string& text, const std::string& words) {
+    return any_has(parse_scene(text, "x.toml").warnings, words);
+  };
+  const std::string closed =
+      with(swing_on_joints, "modes = 1", "modes = 1\nstructure = \"eq14\"\nrotary_inertia = false\norder = 6");
+  EXPECT_TRUE(has(closed, "body boom: rotary_inertia, order do nothing, structure is \"eq14\" and has no beams"));
+  EXPECT_TRUE(has(swing_on_joints + "threshold = 0.3\n", "joint hinge: threshold does nothing"));
+  EXPECT_FALSE(has(swing_on_joints + "threshold = 0.3\nstop_stiffness = 2\n", "nothing"));
+  EXPECT_TRUE(has(with(swing_on_joints, "stiffness = 1\n", "rest = 0.1\n"), "joint hinge: rest does nothing"));
+  EXPECT_TRUE(has(with(swing_on_joints, "kind = \"free\"\n", "kind = \"free\"\nloads = true\n"),
+                  "joint hub: loads does nothing"));
+  const std::string at = "= { body = \"boom\", marker = \"tip\" }\n";
+  EXPECT_TRUE(has(swing_on_joints + "[[loads]]\nname = \"idle\"\nat " + at, "load idle: it does nothing"));
+  EXPECT_TRUE(has(swing_on_joints + "[[springs]]\nname = \"slack\"\na = { body = \"hub\" }\nb " + at,
+                  "spring slack: it does nothing"));
+  EXPECT_FALSE(has(swing_on_joints, "nothing"));
+}
+
 TEST(Warnings, OfKilometresAndDegrees) {
   const std::string joint = swing_on_joints + "rest = 90\n";
   EXPECT_TRUE(any_has(parse_scene(joint, "x.toml").warnings, "joint hinge: has the rest of its spring at 90 rad"));
