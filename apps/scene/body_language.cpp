@@ -149,7 +149,9 @@ void damping_keys(Archive& a, DampingRule& d) {
   const bool by_value = a.reader() && (d.name == "modal" || d.name == "loss-factor");
   a.key({"value", "", R"(of `"modal"` the damping ratio of every mode, of `"loss-factor"` twice that)", by_value},
         d.value, not_negative);
-  a.key({"alpha", "1/s", "of `\"rayleigh\"`: damping alpha M + beta K"}, d.alpha, not_negative);
+  a.key({"alpha", "1/s",
+         "of `\"rayleigh\"`: damping alpha M + beta K of motions in the frame of the body, which its basis holds"},
+        d.alpha, not_negative);
   a.key({"beta", "s", "of `\"rayleigh\"`"}, d.beta, not_negative);
 }
 

@@ -253,7 +253,7 @@ void joint_keys(Archive& a, JointScene& j) {
   a.key(
       {"start_attitude", "", "of a spherical or free joint: quaternion [w, x, y, z] from the axes of b to those of a"},
       j.start_attitude, quaternion);
-  a.key({"start_omega", "rad/s", "of a spherical or free joint, axes of b"}, j.start_omega, finite);
+  a.key({"start_omega", "rad/s", "of a spherical or free joint, axes of its place b"}, j.start_omega, finite);
   a.key({"start_position", "m", "of a free joint, axes of a"}, j.start_position, finite);
   a.key({"start_velocity", "m/s", "of a free joint, axes of a"}, j.start_velocity, finite);
   a.key({"loads", "", "whether its force and torque are outputs"}, j.loads);

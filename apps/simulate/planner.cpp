@@ -198,13 +198,25 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
 
 bool Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
   if (open_.empty()) return false;
+  const Scene given = scene;
   std::optional<Scene> cheap = by_cheapest_means(scene);
-  if (!cheap) return choose_as_flown(scene, hooks, plan);
-  const bool has_chosen = choose_as_flown(*cheap, hooks, plan);
-  cheap->formulation = scene.formulation, cheap->integrator = scene.integrator;
-  cheap->integrator_tolerance = scene.integrator_tolerance;
-  scene = *std::move(cheap);
+  const bool has_chosen = choose_as_flown(cheap ? *cheap : scene, hooks, plan);
+  if (cheap) {
+    cheap->formulation = scene.formulation, cheap->integrator = scene.integrator;
+    cheap->integrator_tolerance = scene.integrator_tolerance;
+    scene = *std::move(cheap);
+  }
+  if (has_chosen && !given.error_budget) warn_of_tones(given, scene, hooks);
   return has_chosen;
+}
+
+/// Of drives that move faster vibrations than those of the candidates: no budget shows them.
+void Planner::warn_of_tones(const Scene& given, Scene& chosen, const RunHooks& hooks) const {
+  try {
+    require_drives_shown(with_candidates(given, candidates_, candidates_, hooks), hooks);
+  } catch (const InputError& e) {
+    chosen.warnings.push_back(fmt::format("the modes may be too few, and the error budget is off: {}", e.what()));
+  }
 }
 
 bool Planner::choose_as_flown(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {

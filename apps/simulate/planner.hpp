@@ -61,6 +61,8 @@ class Planner {
   bool is_hopeless_front(const OutputErrors&, double tolerance) const;
   Scene with_first(const Scene& all, const std::vector<Candidate>&, size_t count) const;
 
+  void warn_of_tones(const Scene& given, Scene& chosen, const RunHooks&) const;
+
   /// Modes beside those of the plan that have shown its truncation: candidates, too, from then on. The plan gets the
   /// elements that these had.
   void note_shown(Scene& planned, const RunHooks&);

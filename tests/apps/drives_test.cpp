@@ -11,6 +11,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
 
 namespace flexboom {
 namespace {
@@ -90,6 +91,16 @@ TEST(TruncationOfATone, ReachesTheModesThatItMoves) {
   const double left = largest(
       compare_outputs(without_coordinates(planned.outputs), reference, scene.outputs, floors_of(scene, r.bodies)));
   EXPECT_LT(left, scene.tolerance);
+}
+
+TEST(TruncationOfATone, IsWarnedOfWithoutABudget) {
+  const std::string tone = fmt::format("0.05*(1-cos(0.7*t))+5e-7*(1-cos({:.9f}*t))", clamped_frequency(16));
+  for (const auto& [motion, is_warned] : {std::pair(tone, true), {std::string("0.05*(1-cos(0.7*t))"), false}}) {
+    Scene scene = parse_scene(shaken_by(motion), "shaken.toml");
+    scene.error_budget = false, scene.bodies[0].modes_auto = true;
+    EXPECT_EQ(any_has(run_scene(scene, {}).warnings, "the modes may be too few, and the error budget is off"),
+              is_warned);
+  }
 }
 
 // A mode that the elements do not know, or too many of them, is no mode that is shown.
