@@ -1,7 +1,6 @@
 #include "apps/simulate/drives.hpp"
 
-#include "apps/scene/wanted_accuracy.hpp"
-#include "apps/simulate/output_errors.hpp"
+#include "dynamics/numerics/expression.hpp"
 
 #include <unsupported/Eigen/FFT>
 
@@ -31,28 +30,65 @@ double largest(const Reals& values) {
   return most;
 }
 
-/// Do cubics through every second of these values follow the others, but for a few corners and jumps?
-bool is_resolved(const Reals& v) {
+/// Do cubics through these values follow the function between them, but near its corners and in a few other places? It
+/// is looked at in places that follow no period, for a tone looks slow where it has the period of the looks.
+bool is_resolved(const Reals& v, const std::function<double(double)>& f, double duration, const Reals& corners) {
   constexpr double negligible = 1e-6;
-  constexpr size_t corners = 16;
-  const double allowed = negligible * largest(v);
+  constexpr size_t few = 16;
+  const double allowed = negligible * largest(v), step = duration / static_cast<double>(v.size() - 1);
   size_t others = 0;
-  for (size_t i = 3; i + 3 < v.size(); i += 2)
-    if (!(std::abs((9 * (v[i - 1] + v[i + 1]) - v[i - 3] - v[i + 3]) / 16 - v[i]) <= allowed)) ++others;
-  return others <= corners;
+  for (size_t i = 1; i + 2 < v.size() && others <= few; ++i) {
+    const auto corner = std::ranges::lower_bound(corners, static_cast<double>(i - 1) * step);
+    if (corner != corners.end() && *corner <= static_cast<double>(i + 2) * step) continue;
+    const double place = static_cast<double>(i) * std::numbers::phi, x = 0.1 + 0.8 * (place - std::floor(place));
+    const double cubic = -x * (x - 1) * (x - 2) / 6 * v[i - 1] + (x + 1) * (x - 1) * (x - 2) / 2 * v[i] -
+                         (x + 1) * x * (x - 2) / 2 * v[i + 1] + (x + 1) * x * (x - 1) / 6 * v[i + 2];
+    if (!(std::abs(cubic - f((static_cast<double>(i) + x) * step)) <= allowed)) ++others;
+  }
+  return others <= few;
 }
 
-/// |sum of value_i exp(-i w t_i)|, t at equal steps, for w from 0 by pi / duration.
-Reals transform(const Reals& values) {
+using Sums = std::vector<std::complex<double>>;
+
+/// The sums of value_i exp(-i w t_i), t at equal steps, for w from 0 by pi / duration.
+Sums transform(const Reals& values) {
   Eigen::FFT<double> fft;
   fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
   Reals padded(values);
   padded.resize(2 * std::bit_floor(values.size()), 0.0);
-  std::vector<std::complex<double>> sums;
+  Sums sums;
   fft.fwd(sums, padded);
-  Reals sizes(sums.size());
-  std::ranges::transform(sums, sizes.begin(), [](std::complex<double> z) { return std::abs(z); });
-  return sizes;
+  return sums;
+}
+
+Reals sizes(const Sums& sums, double scale) {
+  Reals r(sums.size());
+  std::ranges::transform(sums, r.begin(), [scale](std::complex<double> z) { return scale * std::abs(z); });
+  return r;
+}
+
+/// The same of values under Hann's window: a tone has hardly any side lobes there.
+Sums windowed(const Sums& sums) {
+  Sums r(sums);
+  for (size_t i = 2; i + 2 < sums.size(); ++i) r[i] = sums[i] - (sums[i - 2] + sums[i + 2]) / 2.0;
+  return r;
+}
+
+/// The third highest peak of these values from `first` to `end`, peaks as wide as those of tones under the window. One
+/// tone, or two, are no rule for others; harmonics of a period are.
+double third_peak(const Reals& values, size_t first, size_t end) {
+  constexpr size_t width = 4;
+  std::vector<size_t> peaks;
+  for (int n = 0; n < 3; ++n) {
+    size_t best = end;
+    for (size_t i = first; i < end; ++i) {
+      const auto is_beside = [i](size_t peak) { return std::max(i, peak) - std::min(i, peak) <= width; };
+      if ((best == end || values[i] > values[best]) && std::ranges::none_of(peaks, is_beside)) best = i;
+    }
+    if (best == end) return 0;
+    peaks.push_back(best);
+  }
+  return values[peaks.back()];
 }
 
 }  // namespace
@@ -71,6 +107,14 @@ std::vector<Drive> drives_of(const Scene& scene) {
     for (size_t i = 0; i < 3; ++i) add(l.force[i], false), add(l.torque[i], false);
   for (const WheelScene& w : scene.wheels) add(w.torque, false);
   return drives;
+}
+
+std::vector<double> corners_of(const Drive& drive, double duration, int samples) {
+  std::vector<double> corners = drive.course.corners;
+  if (const std::string& formula = drive.given->expression; !formula.empty())
+    corners = Expression(formula).corners(0, duration, samples);
+  std::ranges::sort(corners);
+  return corners;
 }
 
 int samples_of(const Scene& scene, const std::vector<Drive>& drives) {
@@ -96,7 +140,8 @@ DriveSpectra::DriveSpectra(const Scene& scene) {
 DriveSpectra::Spectrum DriveSpectra::spectrum_of(const Drive& drive, double duration, int samples) {
   constexpr size_t most = 1 << 18;
   Reals f = sampled(drive.felt(), duration, static_cast<size_t>(samples));
-  while (!drive.given->table && f.size() < most && !is_resolved(f))
+  const Reals corners = corners_of(drive, duration, samples);
+  while (!drive.given->table && f.size() < most && !is_resolved(f, drive.felt(), duration, corners))
     f = sampled(drive.felt(), duration, 2 * f.size() - 2);
   Spectrum s;
   s.step = std::numbers::pi / duration;
@@ -106,10 +151,11 @@ DriveSpectra::Spectrum DriveSpectra::spectrum_of(const Drive& drive, double dura
   Reals changes(f.size());
   changes[0] = f[0];
   for (size_t i = 1; i < f.size(); ++i) changes[i] = f[i] - f[i - 1];
-  s.strength = transform(changes);
-  s.content = transform(f);
-  for (double& a : s.strength) a /= size;
-  for (double& a : s.content) a *= 2 / (steps * size);
+  const Sums sums = transform(changes);
+  s.strength = sizes(sums, 1 / size);
+  s.repeated = sizes(windowed(sums), 1 / size);
+  s.content = sizes(transform(f), 2 / (steps * size));
+  for (size_t i = 1; i < s.repeated.size(); ++i) s.repeated[i] /= static_cast<double>(i);
   return s;
 }
 
@@ -124,11 +170,11 @@ double DriveSpectra::fastest_beyond(double lowest, double shown) const {
       below = std::max(below, s.content[i] / std::max(lowest, static_cast<double>(i) * s.step));
     Reals level;
     for (size_t i = first; i < end; ++i) level.push_back(s.strength[i] / static_cast<double>(i));
-    double expected = 0;
+    double expected = third_peak(s.repeated, first, end);
     if (!level.empty()) {
       const auto high = level.begin() + static_cast<std::ptrdiff_t>(nearly_all * static_cast<double>(level.size() - 1));
       std::ranges::nth_element(level, high);
-      expected = *high;
+      expected = std::max(expected, *high);
     }
     for (size_t i = s.strength.size(); i-- > std::max<size_t>(end, 1);) {
       const double w = static_cast<double>(i) * s.step, strength = s.strength[i];

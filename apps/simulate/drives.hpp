@@ -23,6 +23,9 @@ struct Drive {
 /// Of joints, loads and wheels. Constants are none. @throws InputError as course_of.
 std::vector<Drive> drives_of(const Scene&);
 
+/// Where it is not smooth, ascending [s]; a formula is looked at so many times.
+std::vector<double> corners_of(const Drive&, double duration, int samples);
+
 /// How many times drives are looked at before a flight: at each output and between, and in each row of a table.
 int samples_of(const Scene&, const std::vector<Drive>&);
 
@@ -30,7 +33,8 @@ int samples_of(const Scene&, const std::vector<Drive>&);
 ///
 /// An undamped vibration of frequency w under f(t) has the amplitude A / w^2 beside its static part f / w^2, where A is
 /// |f(0) + integral of f' exp(i w t) dt|. A step gives one A to all frequencies, noise and pulses one A / w. So what
-/// some modes show is an upper bound for those beyond. A tone has a peak there, which they do not show.
+/// some modes show is an upper bound for those beyond. So it is of a square wave of which they show three harmonics. A
+/// tone has a peak beyond, which they do not show.
 class DriveSpectra {
  public:
   explicit DriveSpectra(const Scene&);
@@ -45,7 +49,8 @@ class DriveSpectra {
   struct Spectrum {
     double step = 0;               // [rad/s]
     std::vector<double> strength;  // A over the largest |f|, at 0, step, 2 step, ...
-    std::vector<double> content;   // amplitude of f over its largest |f|, likewise
+    std::vector<double> repeated;  // the same of what goes on all the time, over 0, 1, 2, ...
+    std::vector<double> content;   // amplitude of f over its largest |f|
   };
   static Spectrum spectrum_of(const Drive&, double duration, int samples);
 

@@ -6,7 +6,6 @@
 #include "apps/scene/scene_orbit.hpp"
 #include "apps/simulate/drives.hpp"
 #include "dynamics/model/time_function.hpp"
-#include "dynamics/numerics/expression.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 
@@ -269,8 +268,7 @@ void set_corners(const Scene& scene, IntegratorOptions& o) {
   const int samples = samples_of(scene, drives);
   std::vector<std::function<double(double)>> functions;
   for (const Drive& d : drives) {
-    add_corners(d.course.corners);
-    if (!d.given->expression.empty()) add_corners(Expression(d.given->expression).corners(0, scene.duration, samples));
+    add_corners(corners_of(d, scene.duration, samples));
     if (!d.given->manoeuvre) functions.push_back(d.felt());
   }
   constexpr double of_tolerance = 1e-3;

@@ -64,12 +64,24 @@ TEST(DriveSpectra, AToneBeyondTheModesShownIsFound) {
   EXPECT_EQ(fastest("0.05*(1-cos(0.7*t))+1e-6*(1-cos(3000*t))", 3100), 0);
 }
 
+// 4096 looks in 2 s see nothing of a tone of 2048 Hz, or of twice as many.
+TEST(DriveSpectra, ATonePeriodicWithTheLooksIsFound) {
+  for (const int times : {1, 2})
+    EXPECT_NEAR(fastest(fmt::format("0.05*(1-cos(0.7*t))+1e-6*(1-cos(2*pi*2048*{}*t))", times), 300),
+                2 * std::numbers::pi * 2048 * times, 200);
+}
+
 // What the modes up to there show of these is a bound for the others.
 TEST(DriveSpectra, SlowMotionsPulsesAndCornersHaveNoTones) {
   EXPECT_EQ(fastest("0.05*(1-cos(0.7*t))", 300), 0);
   EXPECT_EQ(fastest("0.01*t^2", 300), 0);
   EXPECT_EQ(fastest("0.001*(t-1)^3*(t>1)", 300), 0);
   EXPECT_EQ(fastest("1e-3*exp(-((t-1)/0.003)^2)", 300), 0);
+  const std::string thruster = shaken + "[[loads]]\nname = \"thruster\"\nat = { body = \"boom\", marker = \"tip\" }\n";
+  for (const char* force : {"0.01*(sin(2*pi*20*t)>0)", "0.01*(sin(2*pi*20*t)>0.9)", "0.01*(t>0.3)"}) {
+    const std::string text = thruster + fmt::format("force = [0, \"{}\", 0]\n", force);
+    EXPECT_EQ(DriveSpectra(parse_scene(text, "thruster.toml")).fastest_beyond(10, 2654), 0) << force;
+  }
 }
 
 // A resonance with the tenth mode, of which three modes and the next four know nothing. Reference: 14 modes.
