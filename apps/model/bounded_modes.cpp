@@ -85,7 +85,8 @@ std::optional<BoundedModes> finer(const Model& model, int steps, const EigenOpti
 
 /// Bounds of `m` where `share` of its error, or more, is its change to the other mesh. The k-th frequency of one mesh
 /// and the k-th of another, in ascending order, approach the same limit. Behind a frequency that is not resolved they
-/// may not. A change of a solid that is fifty times smaller than the largest is small by accident.
+/// may not. A change of a solid that is fifty times smaller than the largest of its kind, or a thousand times smaller
+/// than that of any, is small by accident.
 FrequencyBounds bounds_of(const BoundedModes& of, const ModalBasis& other, double share) {
   const ModalBasis& m = of.basis;
   FrequencyBounds r{VectorXd::Constant(m.omega.size(), unknown), "from the next finer mesh"};
@@ -94,8 +95,13 @@ FrequencyBounds bounds_of(const BoundedModes& of, const ModalBasis& other, doubl
   const Eigen::ArrayXd change = (m.omega.segment(first, n).array() / other.omega.segment(first, n).array() - 1).abs();
   const auto resolved = std::ranges::find_if_not(change, [](double c) { return c < unresolved; }) - change.begin();
   if (resolved == 0) return r;
-  const double least = is_solid(of.model) ? change.head(resolved).maxCoeff() / 50 : 0;
-  r.relative.segment(first, resolved) = change.head(resolved).max(least) / share + m.summary.residual_max + round_off;
+  const auto kind = [&](Index k) { return m.kind[static_cast<size_t>(first + k)]; };
+  for (Index k = 0; k < resolved; ++k) {
+    double least = 0;
+    for (Index of_other = 0; is_solid(of.model) && of_other < resolved; ++of_other)
+      least = std::max(least, change[of_other] / (kind(of_other) == kind(k) ? 50 : 1000));
+    r.relative[first + k] = std::max(change[k], least) / share + m.summary.residual_max + round_off;
+  }
   return r;
 }
 
