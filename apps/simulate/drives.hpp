@@ -33,8 +33,8 @@ int samples_of(const Scene&, const std::vector<Drive>&);
 ///
 /// An undamped vibration of frequency w under f(t) has the amplitude A / w^2 beside its static part f / w^2, where A is
 /// |f(0) + integral of f' exp(i w t) dt|. A step gives one A to all frequencies, noise and pulses one A / w. So what
-/// some modes show is an upper bound for those beyond. So it is of a square wave of which they show three harmonics. A
-/// tone has a peak beyond, which they do not show.
+/// some modes show is an upper bound for those beyond. The same holds of a square wave of which they show three
+/// harmonics. A tone has a peak beyond, which they do not show.
 class DriveSpectra {
  public:
   explicit DriveSpectra(const Scene&);
