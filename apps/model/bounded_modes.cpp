@@ -10,7 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <optional>
 #include <utility>
 #include <variant>
 
@@ -110,7 +110,8 @@ double worst(const BoundedModes& m) { return m.bounds.worst(m.basis.rigid_freedo
 /// How far to go on to finer meshes.
 struct Steps {
   int most = 0;
-  double hope = std::numeric_limits<double>::infinity();  // largest bound from which to go on, in accuracies
+  std::optional<double>
+      hope{};  // largest bound from which to go on, in accuracies; none: from any, and from an unknown
 };
 
 /// Goes on to finer meshes until the accuracy is met. Where there is not one, or no hope in it, the bounds are from the
@@ -136,7 +137,8 @@ BoundedModes climb(BoundedModes here, Steps allowed, double fall, const EigenOpt
     }
     bound_by_coarser(*next, here, here.bound_seconds);
     here = *std::move(next);
-    if (here.met() == true || !(worst(here) <= allowed.hope * *here.accuracy)) return here;
+    const bool is_hopeless = allowed.hope && !(worst(here) <= *allowed.hope * *here.accuracy);
+    if (here.met() == true || is_hopeless) return here;
   }
 }
 
@@ -174,8 +176,8 @@ BoundedModes bounded_modes(Model model, const EigenOptions& options, int threads
   if (!first.model.body) return first;
   first.bounds.how = "there is no other mesh that is small enough to be compared with";
   const double fall = slowest_fall(*first.model.body);
-  if (!refine) return climb(std::move(first), {}, fall, options, threads);
-  constexpr Steps few = {1, 3};
+  if (!refine) return climb(std::move(first), Steps{}, fall, options, threads);
+  constexpr Steps few = {.most = 1, .hope = 3};
   Model start = first.model;
   VectorXd omega = first.basis.omega;
   const auto order_of = [](const Model& m) { return chosen(m.body->geometry, m.body->solid).order; };
@@ -196,7 +198,7 @@ BoundedModes bounded_modes(Model model, const EigenOptions& options, int threads
   std::optional<Model> better =
       tuned(std::move(start), std::move(omega), best.basis.rigid_freedoms, *best.accuracy, options, threads);
   best.bound_seconds += clock.seconds();
-  if (better) attempt(modes_of(*std::move(better), options, threads), {most_steps});
+  if (better) attempt(modes_of(*std::move(better), options, threads), Steps{.most = most_steps});
   return best;
 }
 

@@ -258,9 +258,10 @@ void warn_of_idle_keys(const Scene& scene, std::vector<std::string>& warnings) {
          fmt::format("structure is \"{}\" and has no beams", b.structure));
   }
   for (const JointScene& j : scene.joints) {
-    if (joint_type(j.kind).scalars == 1 && j.mechanism.threshold != 0 && !(j.mechanism.stop_stiffness > 0))
+    const bool has_mechanism = joint_type(j.kind).scalars == 1;
+    if (has_mechanism && j.mechanism.threshold != 0 && !(j.mechanism.stop_stiffness > 0))
       idle("joint " + j.name, "threshold does", "without stop_stiffness there is no stop");
-    if (joint_type(j.kind).scalars == 1 && j.mechanism.rest != 0 && !(j.mechanism.stiffness > 0))
+    if (has_mechanism && j.mechanism.rest != 0 && !(j.mechanism.stiffness > 0))
       idle("joint " + j.name, "rest does", "without stiffness there is no spring");
     if (j.kind == JointKind::free && j.loads) idle("joint " + j.name, "loads does", "a free joint bears none");
   }
