@@ -30,14 +30,14 @@ MatrixXd rigid_accelerations(const MatrixXd& F, const MatrixXd& T, const MatrixX
   return (T.transpose() * MT).completeOrthogonalDecomposition().solve(T.transpose() * F);
 }
 
-/// Whether the body is free. @throws InputError when it can move in some ways and not in all.
+/// Whether the body is free. @throws InputError when it can move in some ways and not in all: six, of a line mass five.
 bool is_free(const Mesh& mesh, const DofMap& dofs, const Clamp& clamp) {
-  const int rigid = rigid_freedoms(mesh, dofs, clamp);
-  require(rigid == 0 || rigid == 6,
-          fmt::format("geometric stiffness: the clamp leaves {} of the six rigid motions; hold the body, or leave it "
+  const int rigid = rigid_freedoms(mesh, dofs, clamp), all = rigid_freedoms(mesh, dofs, Clamp({}, false));
+  require(rigid == 0 || rigid == all,
+          fmt::format("geometric stiffness: the clamp leaves {} of the {} rigid motions; hold the body, or leave it "
                       "free for inertia relief",
-                      rigid));
-  return rigid == 6;
+                      rigid, all));
+  return rigid > 0;
 }
 
 /// Unit loads, what of them is inertia, and the static displacements that they cause.
