@@ -206,7 +206,7 @@ TEST(Scene, ValidateFindsWhatAnOverrideBreaks) {
             std::string::npos);
   EXPECT_NE(broken([](Scene& s) { s.integrator = "bfd"; }).find("did you mean \"bdf\"?"), std::string::npos);
   EXPECT_EQ(broken([](Scene& s) { s.formulation = "multipliers", s.integrator = "bdf"; }),
-            "integrator.method: is \"bdf\"; it must be \"auto\" or \"ida\"");
+            "integrator.method: is \"bdf\"; it must be \"auto\" or \"ida\"; \"bdf\" takes formulation = \"relative\"");
   EXPECT_NE(broken([](Scene& s) { s.formulation = "redundant"; }).find("\"relative\" or \"multipliers\""),
             std::string::npos);
 }

@@ -268,7 +268,9 @@ TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
       {"value = [0, 0.1, 0]", "value = [0, 0.1]", "wheels[0].torque: "},
       {"time = [0, 1, 2]", "time = [0, 1, 1.5]", "the table reaches from 0 s to 1.5 s"},
       {"loads = true", "closes_loop = true", "formulation = \"multipliers\""},
-      {"method = \"bdf\"", "method = \"ida\"", "integrator.method: is \"ida\"; it must be"},
+      {"method = \"bdf\"", "method = \"ida\"",
+       "integrator.method: is \"ida\"; it must be \"auto\", \"exponential\", \"bdf\", \"adams\", \"dirk\" or \"erk\"; "
+       "\"ida\" takes formulation = \"multipliers\""},
       {"\"lift.length\"", "\"lift.length 1e-3 rad\"",
        "accuracy.outputs: is 'lift.length 1e-3 rad', but lift.length is in m"},
       {"\"lift.length\"", "\"lift.length 1e-12\"", "accuracy.outputs: is 'lift.length 1e-12', tighter than tolerance"},
