@@ -22,8 +22,7 @@ constexpr int most_beyond = 64, most_for_tones = 96;  // modes of a body
 /// Of the modes of a body, in their order [rad/s].
 std::vector<double> frequencies(const PreparedBody& p) {
   std::vector<double> w;
-  for (int k = 0; k < p.coordinates_of_modes(); ++k)
-    w.push_back(std::sqrt(std::max(0.0, p.body.Ke(k, k) / p.body.Me(k, k))));
+  for (int k = 0; k < p.coordinates_of_modes(); ++k) w.push_back(p.body.frequency(k));
   return w;
 }
 

@@ -163,7 +163,7 @@ void ErrorScales::set_floors(const VectorXd& y0) {
     for (int k = 0; k < body.n(); ++k) {
       const double size = of_size * length * std::sqrt(body.m / body.Me(k, k));
       floor_[l.q[b] + k] = size;
-      floor_[l.rate(l.q[b] + k)] = size * std::sqrt(body.Ke(k, k) / body.Me(k, k));
+      floor_[l.rate(l.q[b] + k)] = size * body.frequency(k);
     }
   }
   VectorXd beside = y0;  // on their way through space: that energy shakes nothing

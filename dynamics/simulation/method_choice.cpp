@@ -22,7 +22,7 @@ struct ElasticFrequencies {
   explicit ElasticFrequencies(const Multibody& scene) {
     for (const ReducedBody& body : scene.bodies)
       for (int k = 0; k < body.n(); ++k) {
-        const double omega = std::sqrt(std::max(0.0, body.Ke(k, k) / body.Me(k, k)));
+        const double omega = body.frequency(k);
         if (omega > 0 && (least == 0 || omega < least)) least = omega;
         largest = std::max(largest, omega);
       }

@@ -272,7 +272,7 @@ void observe(const std::vector<StiffeningEffect>& effect, double t, std::vector<
 double change_without_stiffening(const ReducedBody& body, double size, double duration) {
   double slowest = std::numeric_limits<double>::infinity(), damping = 0;
   for (int k = 0; k < body.n(); ++k) {
-    const double omega = std::sqrt(body.Ke(k, k) / body.Me(k, k));
+    const double omega = body.frequency(k);
     if (omega > 0 && omega < slowest) slowest = omega, damping = 0.5 * body.De(k, k) / (body.Me(k, k) * omega);
   }
   if (!std::isfinite(slowest)) return size;

@@ -174,7 +174,7 @@ MatrixXd observabilities(const ReducedBody& body, const std::vector<ObservedOutp
     const VectorXd S = component < 3 ? seen.S.row(component) : seen.S_theta.row(component - 3);
     auto row = share.row(static_cast<Index>(i));
     for (int k = 0; k < body.n(); ++k) {
-      const double omega = std::sqrt(std::max(0.0, body.Ke(k, k) / body.Me(k, k)));
+      const double omega = body.frequency(k);
       row(k) = S(k) * S(k) / (body.Me(k, k) * omega * omega * omega);
       if (S(k) == 0) row(k) = 0;
     }

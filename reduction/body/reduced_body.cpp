@@ -162,6 +162,8 @@ Eigen::MatrixXd modal_damping(const ReducedBody& body, double zeta) {
 
 }  // namespace
 
+double ReducedBody::frequency(Eigen::Index k) const { return std::sqrt(std::max(Ke(k, k), 0.0) / Me(k, k)); }
+
 void ReducedBody::validate() const {
   const Checker c(*this);
   validate_rigid_part(*this, c);

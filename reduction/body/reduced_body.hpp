@@ -110,6 +110,9 @@ struct ReducedBody {
 
   int n() const { return static_cast<int>(Me.rows()); }
 
+  /// Frequency of a coordinate alone, all others held [rad/s]; 0 where its stiffness is none, or below by round-off.
+  double frequency(Eigen::Index k) const;
+
   /// Sizes agree, m > 0, J0 is an inertia, Me is positive definite, no marker or interface is there twice, interfaces
   /// lie within the coordinates.
   /// @throws InputError naming the field.

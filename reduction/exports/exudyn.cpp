@@ -235,10 +235,7 @@ ReducedBody body_of(const ExudynDictionary& file) {
   if (file.contains("dampingMatrixReduced")) body.De = matrix(file, "dampingMatrixReduced", n, n);
   read_integrals(body, file);
   read_nodes(body, file);
-  for (Index k = 0; k < n; ++k) {
-    body.coordinates.push_back(
-        {"mode", std::sqrt(std::max(body.Ke(k, k), 0.0) / body.Me(k, k)) / (2 * std::numbers::pi)});
-  }
+  for (Index k = 0; k < n; ++k) body.coordinates.push_back({"mode", body.frequency(k) / (2 * std::numbers::pi)});
   body.validate();
   return body;
 }

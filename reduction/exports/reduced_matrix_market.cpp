@@ -48,10 +48,7 @@ ReducedBody read_reduced_matrices(const fs::path& folder) {
   body.De = square("De.mtx", n);
   set_invariants(body, square("gram.mtx", 4 + 3 * n));
   body.Me = square("Me.mtx", n);
-  for (Index k = 0; k < n; ++k) {
-    const double omega_2 = std::max(body.Ke(k, k), 0.0) / body.Me(k, k);
-    body.coordinates.push_back({"mode", std::sqrt(omega_2) / (2 * std::numbers::pi)});
-  }
+  for (Index k = 0; k < n; ++k) body.coordinates.push_back({"mode", body.frequency(k) / (2 * std::numbers::pi)});
   body.validate();
   return body;
 }
