@@ -173,8 +173,9 @@ std::optional<Beyond> modes_beyond(const Scene& scene, const Scene& flown, const
   if (!any_elastic(scene)) return {};
   if (scene.from) throw InputError("a saved state knows nothing of modes beyond its own");
   const bool loads = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name);
-  Scene more = with_more_modes(flown, {.as_many = loads}, hooks);
-  require_drives_shown(more, hooks);
+  const DriveSpectra drives(flown);
+  Scene more = with_more_modes(flown, {.as_many = loads}, drives, hooks);
+  require_drives_shown(more, drives, hooks);
   Beyond r{without_kinds(std::move(more), still, hooks)};
   constexpr double few_digits = 1e-5;
   r.has_few_digits = flown.tolerance < few_digits;

@@ -2,7 +2,6 @@
 
 #include "apps/model/prepared_body.hpp"
 #include "apps/model/static_shapes.hpp"
-#include "apps/simulate/drives.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
@@ -164,8 +163,7 @@ BodyScene with_more_modes(const BodyScene& b, const ModesBeyond& more, double re
 
 }  // namespace
 
-Scene with_more_modes(Scene scene, const ModesBeyond& more, const RunHooks& hooks) {
-  const DriveSpectra drives(scene);
+Scene with_more_modes(Scene scene, const ModesBeyond& more, const DriveSpectra& drives, const RunHooks& hooks) {
   for (BodyScene& b : scene.bodies) {
     if (b.richer && b.richer->more_modes) {
       b.reduced = {b.richer, &*b.richer->more_modes};
@@ -184,8 +182,7 @@ Scene with_more_modes(Scene scene, const ModesBeyond& more, const RunHooks& hook
   return scene;
 }
 
-void require_drives_shown(const Scene& scene, const RunHooks& hooks) {
-  const DriveSpectra drives(scene);
+void require_drives_shown(const Scene& scene, const DriveSpectra& drives, const RunHooks& hooks) {
   if (drives.empty()) return;
   for (const BodyScene& b : scene.bodies) {
     if (b.rigid || b.structure == "rigid") continue;

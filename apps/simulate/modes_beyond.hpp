@@ -1,5 +1,6 @@
 #pragma once
 
+#include "apps/simulate/drives.hpp"
 #include "apps/simulate/simulate.hpp"
 
 #include <algorithm>
@@ -31,12 +32,12 @@ struct ModesBeyond {
 /// they have. They get half as many of other kinds, for what bends out of the hinge plane is left out, too. Some of
 /// these stretch and some twist. Static shapes of loads at the free end stand for them where no mode among many does.
 /// Other bases get so many in each plane. Bodies from files get the modes that their files have beyond those kept.
-/// Where drives of the scene move faster vibrations than these show (DriveSpectra), booms get all modes up to there.
-/// Beams get them of finer elements.
+/// Where the drives of the scene move faster vibrations than these show, booms get all modes up to there. Beams get
+/// them of finer elements.
 /// @throws InputError, NumericalError as prepare_body.
-Scene with_more_modes(Scene, const ModesBeyond&, const RunHooks&);
+Scene with_more_modes(Scene, const ModesBeyond&, const DriveSpectra&, const RunHooks&);
 
 /// @throws InputError where the drives of a scene move faster vibrations than its modes show.
-void require_drives_shown(const Scene&, const RunHooks&);
+void require_drives_shown(const Scene&, const DriveSpectra&, const RunHooks&);
 
 }  // namespace flexboom

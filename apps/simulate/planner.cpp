@@ -5,6 +5,7 @@
 #include "apps/model/prepared_body.hpp"
 #include "apps/model/static_shapes.hpp"
 #include "apps/simulate/error_budget.hpp"
+#include "apps/simulate/fewest_enough.hpp"
 #include "apps/simulate/flights_ahead.hpp"
 #include "apps/simulate/time_error.hpp"
 #include "apps/simulate/variants.hpp"
@@ -26,7 +27,6 @@
 
 namespace flexboom {
 
-using Eigen::Index;
 using Eigen::VectorXd;
 
 namespace {
@@ -35,7 +35,6 @@ constexpr double unmoved = 1e-12;    // of the largest displacement: round-off o
 constexpr int most_candidates = 96;  // per body
 constexpr int fewest = 4;            // candidates per body
 constexpr int for_budget = 8;        // modes beside the candidates that show their truncation
-constexpr int most_trials = 6;       // runs with fewer modes
 constexpr int most_rounds = 5;       // improvements
 constexpr double not_near = 10;      // times the tolerance: more modes that hardly help do not get there
 constexpr double first_near = 100;   // the same, where more have not been looked at
@@ -131,7 +130,7 @@ void Planner::note_still(const std::vector<Candidate>& list) {
 }
 
 void Planner::note_shown(Scene& planned, const RunHooks& hooks) {
-  const Scene more = with_more_modes(planned, {}, hooks);
+  const Scene more = with_more_modes(planned, {}, DriveSpectra(planned), hooks);
   for (const size_t i : open_) {
     planned.bodies[i].geometry = more.bodies[i].geometry;
     if (planned.bodies[i].basis.name != "clamped" || planned.bodies[i].directions != "all") continue;
@@ -213,7 +212,7 @@ bool Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::strin
 /// Of drives that move faster vibrations than those of the candidates: no budget shows them.
 void Planner::warn_of_tones(const Scene& given, Scene& chosen, const RunHooks& hooks) const {
   try {
-    require_drives_shown(with_candidates(given, candidates_, candidates_, hooks), hooks);
+    require_drives_shown(with_candidates(given, candidates_, candidates_, hooks), DriveSpectra(given), hooks);
   } catch (const InputError& e) {
     chosen.warnings.push_back(fmt::format("the modes may be too few, and the error budget is off: {}", e.what()));
   }
@@ -267,75 +266,52 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
     return static_cast<size_t>(std::ranges::count_if(
         list, [&](const Candidate& c) { return c.displacement > share * list.front().displacement; }));
   };
+  const size_t moved = moving_by(unmoved);
+  std::vector<double> displacements;
+  for (size_t k = 0; k < moved; ++k) displacements.push_back(list[k].displacement);
   const double bearable = scene.tolerance / 3;
-  const auto error_with = [&](size_t count) {
+  FewestEnough search(std::move(displacements), bearable, too_few_, moving_by(scene.tolerance / 10));
+  const auto error_of = [&](const Scene& tried) {
     try {
-      const Scene tried = with_first(all, list, count);
       Run run = fly(tried, hooks, 0, bearable_steps(*reference));
       const double e = largest(compare_outputs(without_coordinates(run.outputs), wanted, scene.outputs, floors));
-      if (e <= bearable) keep_flown(tried, std::move(run), hooks);
+      if (e <= bearable) keep_flown(tried, std::move(run), hooks), give_up_ahead(hooks);
       return e;
     } catch (const NumericalError&) {
       return unknown;
     }
   };
-  const size_t moved = moving_by(unmoved);
-  const auto left_out = [&](size_t count) {
-    return std::transform_reduce(list.begin() + static_cast<Index>(count), list.begin() + static_cast<Index>(moved),
-                                 0.0, std::plus(), [](const Candidate& c) { return c.displacement; });
-  };
-  // How many are enough where errors are in proportion to the displacement left out.
-  const auto expected = [&](size_t tried, double tried_error) {
-    size_t count = moved;
-    while (count > 0 && left_out(count - 1) * tried_error <= left_out(tried) * bearable) --count;
-    return count;
-  };
-  size_t enough = moved, too_few = std::min(too_few_, moved), next = moving_by(scene.tolerance / 10);
-  if (too_few > 0) next = too_few + too_few / 8;
-  double error = 0, error_of_fewer = 0;
-  const auto hardly_any = [&] { return enough / 8; };  // a trial costs more than these would save
-  const auto is_settled = [&] { return enough <= too_few + hardly_any(); };
-  const auto between = [&](size_t low) { return static_cast<size_t>(std::sqrt(static_cast<double>(low * enough))); };
-  for (int i = 0; i < most_trials && !is_settled() && !hooks.stopped(); ++i) {
-    const size_t count = std::min(next, enough - 1), if_too_few = between(count + 1);
-    if (if_too_few > count && if_too_few < enough)
-      fly_ahead(with_first(all, list, if_too_few), hooks, 0, bearable_steps(*reference));
-    const double e = error_with(count);
-    next = if_too_few;
-    if (e <= bearable) {
-      enough = count, error = e;
-      give_up_ahead(hooks);
-      next = expected(count, e);
-      if (next + hardly_any() >= enough) break;
-      if (next < too_few) next = between(too_few);
-    } else {
-      too_few = count + 1, error_of_fewer = e;
-    }
+  while (!search.is_settled() && !hooks.stopped()) {
+    if (const size_t after = search.after_too_few(); after > search.next() && after < search.enough())
+      fly_ahead(with_first(all, list, after), hooks, 0, bearable_steps(*reference));
+    search.tell(error_of(with_first(all, list, search.next())));
   }
   give_up_ahead(hooks);
-  kept_ = enough;
-  const Scene chosen = with_first(open, list, enough);
+  kept_ = search.enough();
+  const Scene chosen = with_first(open, list, kept_);
   for (const size_t i : open_) {
     const BodyScene& b = scene.bodies[i] = chosen.bodies[i];
-    if (!has_choice(all, b.name)) {
-      plan.push_back(
-          fmt::format("{}: {} modes; the basis \"{}\" has no choice of them", b.name, b.modes, b.basis.name));
-      continue;
-    }
-    std::vector<std::string> taken, small, still;
-    for (size_t k = 0; k < list.size(); ++k)
-      if (list[k].body == b.name) (k < enough ? taken : k < moved ? small : still).push_back(list[k].kind);
-    const auto known_still = still_.find(b.name);  // by earlier candidates, where these have none of the kind
-    const bool fewer_kinds = known_still != still_.end() && std::ranges::none_of(list, [&](const Candidate& c) {
-                               return c.body == b.name && known_still->second.contains(c.kind);
-                             });
-    plan.push_back(fmt::format(
-        "modes of {}: {}, of {} modes; left out: {} that nothing moves, {} that change the outputs "
-        "by {:.1e} together with those of all bodies{}",
-        b.name, counted(taken), taken.size() + small.size() + still.size(), counted(still), counted(small), error,
-        fewer_kinds ? fmt::format("; no more of {}, which nothing moved", fmt::join(known_still->second, ", ")) : ""));
+    plan.push_back(has_choice(all, b.name) ? words_of_choice(b.name, list, moved, search.error())
+                                           : fmt::format("{}: {} modes; the basis \"{}\" has no choice of them", b.name,
+                                                         b.modes, b.basis.name));
   }
-  return Choice{moved > 0 ? static_cast<double>(enough) / static_cast<double>(moved) : 0, error_of_fewer};
+  return Choice{moved > 0 ? static_cast<double>(kept_) / static_cast<double>(moved) : 0, search.error_of_fewer()};
+}
+
+std::string Planner::words_of_choice(const std::string& body, const std::vector<Candidate>& list, size_t moved,
+                                     double error) const {
+  std::vector<std::string> taken, small, still;
+  for (size_t k = 0; k < list.size(); ++k)
+    if (list[k].body == body) (k < kept_ ? taken : k < moved ? small : still).push_back(list[k].kind);
+  const auto known_still = still_.find(body);  // by earlier candidates, where these have none of the kind
+  const bool fewer_kinds = known_still != still_.end() && std::ranges::none_of(list, [&](const Candidate& c) {
+                             return c.body == body && known_still->second.contains(c.kind);
+                           });
+  return fmt::format(
+      "modes of {}: {}, of {} modes; left out: {} that nothing moves, {} that change the outputs by {:.1e} together "
+      "with those of all bodies{}",
+      body, counted(taken), taken.size() + small.size() + still.size(), counted(still), counted(small), error,
+      fewer_kinds ? fmt::format("; no more of {}, which nothing moved", fmt::join(known_still->second, ", ")) : "");
 }
 
 /// A force that is there at once, when a run begins, moves the effective masses of all modes: what is left out of it
@@ -344,18 +320,25 @@ bool Planner::is_hopeless_front(const OutputErrors& o, double tolerance) const {
   return o.name.ends_with(".force") && o.when == 0 && o.truncation > most_candidates / candidates_ * tolerance;
 }
 
-bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {
+const OutputErrors* Planner::worst_to_mend(const Scene& scene, const ErrorBudget& budget,
+                                           std::vector<std::string>& plan) const {
   const auto is_front = [&](const OutputErrors& o) { return is_hopeless_front(o, scene.tolerance); };
-  const OutputErrors* worst = nullptr;  // of those that may be mended
+  const OutputErrors* worst = nullptr;
   for (const OutputErrors& o : budget.outputs)
     if (!is_front(o) && (worst == nullptr || o.known() > worst->known())) worst = &o;
-  if (budget.has_stiffened) still_.clear();  // geometric stiffness couples kinds
-  const auto front = std::ranges::find_if(budget.outputs, is_front);
-  if (!open_.empty() && front != budget.outputs.end() && (worst == nullptr || worst->known() <= scene.tolerance))
+  const bool is_met = worst == nullptr || worst->known() <= scene.tolerance;
+  if (const auto front = std::ranges::find_if(budget.outputs, is_front); is_met && front != budget.outputs.end())
     plan.push_back(
         fmt::format("truncation: {:.1e} in {}; more modes are not tried: it is there at the start, and falls as 1 / n",
                     front->truncation, front->name));
-  if (open_.empty() || !budget.measured || budget.within(scene.tolerance) || worst == nullptr || hooks.stopped() ||
+  return is_met ? nullptr : worst;
+}
+
+bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& hooks, std::vector<std::string>& plan) {
+  if (open_.empty()) return false;
+  if (budget.has_stiffened) still_.clear();  // geometric stiffness couples kinds
+  const OutputErrors* worst = worst_to_mend(scene, budget, plan);
+  if (worst == nullptr || !budget.measured || budget.within(scene.tolerance) || hooks.stopped() ||
       steps_++ >= most_rounds)
     return false;
   const auto known = [](double part) { return std::isnan(part) ? 0 : part; };
@@ -363,34 +346,41 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
   // A repeat has an error of time of its own. Where those are large, what is no more than both is no truncation.
   const double time = known(worst->time), of_both = time > scene.tolerance / 3 ? 2 * time : time;
   const double others = std::max(of_both, known(worst->linearisation));
-  if (worst->known() <= scene.tolerance || std::max(truncation, discretisation) <= others) return false;
-  if (truncation >= discretisation) {
-    const double before = std::exchange(truncation_, worst->truncation);
-    const bool is_far = truncation_ > before / 2 && truncation_ > not_near * scene.tolerance;
-    const bool stays = truncation_ > 0.9 * before;  // what more modes cannot mend: a direction that is left out
-    const std::string_view why = costly_     ? "flights with more take too many steps"
-                                 : hopeless_ ? "nearly all are needed, and one fewer is far too few"
-                                 : is_far    ? "it falls too slowly"
-                                 : stays     ? "more modes do not change it"
-                                 : candidates_ >= most_candidates ? "there are as many as are tried"
-                                                                  : "";
-    if (!why.empty()) {
-      plan.push_back(
-          fmt::format("truncation: {:.1e} in {}; more modes are not tried: {} (modes = n takes as many as wanted)",
-                      worst->truncation, worst->name, why));
-      return false;
-    }
-    candidates_ = std::min(candidates_ + candidates_ / 2, most_candidates);
-    note_shown(scene, hooks);
-    too_few_ = kept_ + 1;
-    plan.push_back(fmt::format("truncation: {:.1e} in {}; modes are chosen again, from {} of each body",
-                               worst->truncation, worst->name, candidates_));
-    const Scene fewer = scene;
-    for (const size_t i : open_) scene.bodies[i].modes_auto = true;
-    const bool has_chosen = choose(scene, hooks, plan) && !hooks.stopped();
-    if (!has_chosen) scene = fewer;
-    return has_chosen;
+  if (std::max(truncation, discretisation) <= others) return false;
+  return truncation >= discretisation ? choose_from_more(scene, *worst, hooks, plan)
+                                      : take_finer_elements(scene, *worst, plan);
+}
+
+bool Planner::choose_from_more(Scene& scene, const OutputErrors& worst, const RunHooks& hooks,
+                               std::vector<std::string>& plan) {
+  const double before = std::exchange(truncation_, worst.truncation);
+  const bool is_far = truncation_ > before / 2 && truncation_ > not_near * scene.tolerance;
+  const bool stays = truncation_ > 0.9 * before;  // what more modes cannot mend: a direction that is left out
+  const std::string_view why = costly_                          ? "flights with more take too many steps"
+                               : hopeless_                      ? "nearly all are needed, and one fewer is far too few"
+                               : is_far                         ? "it falls too slowly"
+                               : stays                          ? "more modes do not change it"
+                               : candidates_ >= most_candidates ? "there are as many as are tried"
+                                                                : "";
+  if (!why.empty()) {
+    plan.push_back(
+        fmt::format("truncation: {:.1e} in {}; more modes are not tried: {} (modes = n takes as many as wanted)",
+                    worst.truncation, worst.name, why));
+    return false;
   }
+  candidates_ = std::min(candidates_ + candidates_ / 2, most_candidates);
+  note_shown(scene, hooks);
+  too_few_ = kept_ + 1;
+  plan.push_back(fmt::format("truncation: {:.1e} in {}; modes are chosen again, from {} of each body", worst.truncation,
+                             worst.name, candidates_));
+  const Scene fewer = scene;
+  for (const size_t i : open_) scene.bodies[i].modes_auto = true;
+  const bool has_chosen = choose(scene, hooks, plan) && !hooks.stopped();
+  if (!has_chosen) scene = fewer;
+  return has_chosen;
+}
+
+bool Planner::take_finer_elements(Scene& scene, const OutputErrors& worst, std::vector<std::string>& plan) const {
   Scene better = scene;
   for (const size_t i : open_) {
     BodyScene& b = better.bodies[i];
@@ -402,7 +392,7 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
     if (!is_bearable(mesh_of(b, 1))) return false;  // the budget takes a step more
   }
   scene = std::move(better);
-  plan.push_back(fmt::format("discretisation: {:.1e} in {}; finer elements", worst->discretisation, worst->name));
+  plan.push_back(fmt::format("discretisation: {:.1e} in {}; finer elements", worst.discretisation, worst.name));
   return true;
 }
 

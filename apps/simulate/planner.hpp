@@ -58,7 +58,13 @@ class Planner {
   bool has_choice(const Scene&, const std::string& body) const;
   std::vector<Candidate> ranked(const Scene&, const Run&) const;
   void note_still(const std::vector<Candidate>&);
+  /// What is taken of a body and what is left out, of a list of which the first `moved` move.
+  std::string words_of_choice(const std::string& body, const std::vector<Candidate>&, size_t moved, double error) const;
   bool is_hopeless_front(const OutputErrors&, double tolerance) const;
+  /// Of the outputs that more modes or finer elements may mend; nullptr: those are within the tolerance.
+  const OutputErrors* worst_to_mend(const Scene&, const ErrorBudget&, std::vector<std::string>& plan) const;
+  bool choose_from_more(Scene&, const OutputErrors& worst, const RunHooks&, std::vector<std::string>& plan);
+  bool take_finer_elements(Scene&, const OutputErrors& worst, std::vector<std::string>& plan) const;
   Scene with_first(const Scene& all, const std::vector<Candidate>&, size_t count) const;
 
   void warn_of_tones(const Scene& given, Scene& chosen, const RunHooks&) const;

@@ -41,7 +41,7 @@ struct Reference {
 std::vector<Reference> references(const Scene& scene, const std::string& used, const RunHooks& hooks) {
   constexpr int more_orders = 4;
   const Scene cheap = by_cheapest_means(scene).value_or(scene);
-  const Scene modes = with_more_modes(cheap, {.least = 6, .as_many = true}, hooks);
+  const Scene modes = with_more_modes(cheap, {.least = 6, .as_many = true}, DriveSpectra(cheap), hooks);
   return {{"time: another method", by_another_method(scene, used)},
           {"time: the other formulation", in_the_other_formulation(scene)},
           {"truncation: twice the modes of each kind, six more at least", modes, 0, true},
