@@ -70,13 +70,24 @@ bool can_load(const ReducedBody& body, const std::string& name) {
   return !is_interface && marker != body.markers.end() && marker->S.norm() + marker->S_theta.norm() > 0;
 }
 
+namespace {
+
+/// Is a place the node of that other one? A load on it is one on both.
+bool is_same_node(const ReducedBody& body, const std::string& name, const std::string& other) {
+  const Marker &a = marker(body, name), &b = marker(body, other);
+  return a.position == b.position && a.S == b.S && a.S_theta == b.S_theta;
+}
+
+}  // namespace
+
 std::vector<std::string> loads_without_shapes(const Scene& scene, const BodyScene& body) {
   if (!body.reduced || !body.richer || !body.richer->more_modes) return {};
   std::vector<std::string> markers = loaded_markers(scene, body.name);
-  std::erase_if(markers, [&](const std::string& marker) {
-    return !can_load(*body.reduced, marker) ||
-           std::ranges::any_of(body.richer->more_modes->coordinates,
-                               [&](const Coordinate& c) { return c.kind == "attachment" && c.interface == marker; });
+  const ReducedBody& richer = *body.richer->more_modes;
+  std::erase_if(markers, [&](const std::string& loaded) {
+    return !can_load(*body.reduced, loaded) || std::ranges::any_of(richer.coordinates, [&](const Coordinate& c) {
+      return c.kind == "attachment" && is_same_node(richer, loaded, c.interface);
+    });
   });
   return markers;
 }

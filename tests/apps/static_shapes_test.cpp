@@ -141,6 +141,26 @@ TEST(StaticShapes, InterfacesHoldThemAlready) {
   EXPECT_FALSE(std::isnan(run_scene(scene, {}).budget.truncation));
 }
 
+// Of a file: a load at the tip is one on an attachment that sits there, and none on one that sits elsewhere.
+TEST(StaticShapes, OfAFileAreThoseOfTheNode) {
+  const auto bar = [](double position) {
+    ReducedBody body = blank_body("bar", 1);
+    const Eigen::Vector3d x(1, 0, 0);
+    body.markers.push_back({"tip", x, Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)});
+    body.markers.push_back({"mass", position * x, position * Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)});
+    body.coordinates.push_back({"attachment", 0, "mass", "Fy"});
+    return body;
+  };
+  for (const double position : {1.0, 0.5}) {
+    Scene scene = bar_with_weight("", 1e-3);
+    BodyScene& b = scene.bodies[0];
+    b.reduced = std::make_shared<const ReducedBody>(bar(position));
+    b.richer = std::make_shared<const RicherBodies>(RicherBodies{bar(position), {}});
+    const std::vector<std::string> none, tip{"tip"};
+    EXPECT_EQ(loads_without_shapes(scene, b), position == 1 ? none : tip) << position;
+  }
+}
+
 // The panel that carries another one has them, and then few modes will do.
 TEST(StaticShapes, ArePartOfAPlan) {
   Scene scene = scene_named("wing-satellite");
