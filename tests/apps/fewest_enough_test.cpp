@@ -33,8 +33,8 @@ Found found(FewestEnough search, const std::function<double(size_t)>& error_of) 
 // Whatever the first guess is: an eighth at most above the fewest, and what was found is what was told.
 TEST(FewestEnough, AreFoundToAnEighth) {
   constexpr double bearable = 1e-3;
-  for (const size_t needed : {1, 2, 7, 20, 39})
-    for (const size_t first : {0, 3, 10, 38}) {
+  for (const size_t needed : {1U, 2U, 7U, 20U, 39U})
+    for (const size_t first : {0U, 3U, 10U, 38U}) {
       const auto error_of = [&](size_t count) {
         return 0.9 * bearable * std::pow(0.7, double(count) - double(needed));
       };
