@@ -9,6 +9,7 @@
 #include "fem/booms/solid_boom.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -25,6 +26,7 @@ constexpr double unresolved = 0.1;                       // change of a frequenc
 constexpr double round_off = 1e-12;                      // of a frequency by any mesh
 constexpr int most_steps = 3;                            // to finer meshes
 constexpr double usual_fall = 0.5, singular_fall = 0.7;  // of errors, to the next mesh
+constexpr double taper_fall = 0.95;                      // of beams whose stiffness changes much within one of them
 constexpr double coarse_fall = 0.8;  // of elements that are too few for the edges of the clamp, where errors gather
 
 bool is_solid(const Model& model) { return model.body && model.body->structure == "solid"; }
@@ -52,6 +54,16 @@ double slowest_fall(const SectionShape& section, bool own) {
   const auto* r = std::get_if<Rectangle>(&section);
   const bool is_compact = r != nullptr && std::max(r->height, r->width) < strip * std::min(r->height, r->width);
   return own && is_compact ? rectangle : usual_fall;
+}
+
+/// Is an element of beams much stiffer at one end? Errors gather at the thin end, and fall slowly until elements are
+/// short beside the distance to where there would be nothing left.
+bool is_steep(const BeamProperty& p) {
+  constexpr double steep = 27;  // for depths that change to a third
+  const Section a = section_of(p.start, p.material.nu, p.shear), b = section_of(p.end, p.material.nu, p.shear);
+  return std::ranges::any_of(std::array{&Section::Iy, &Section::Iz, &Section::J}, [&](double Section::*stiffness) {
+    return std::max(a.*stiffness, b.*stiffness) > steep * std::min(a.*stiffness, b.*stiffness);
+  });
 }
 
 BoundedModes modes_of(Model model, const EigenOptions& options, int threads) {
@@ -93,14 +105,16 @@ FrequencyBounds bounds_of(const BoundedModes& of, const ModalBasis& other, doubl
   const Index first = m.rigid_freedoms, n = std::min(m.omega.size(), other.omega.size()) - first;
   if (n <= 0) return r;
   const Eigen::ArrayXd change = (m.omega.segment(first, n).array() / other.omega.segment(first, n).array() - 1).abs();
-  const auto resolved = std::ranges::find_if_not(change, [](double c) { return c < unresolved; }) - change.begin();
+  Index resolved = 0;
+  while (resolved < n && change[resolved] < unresolved && m.round_off[first + resolved] < unresolved) ++resolved;
   if (resolved == 0) return r;
   const auto kind = [&](Index k) { return m.kind[static_cast<size_t>(first + k)]; };
   for (Index k = 0; k < resolved; ++k) {
     double least = 0;
     for (Index of_other = 0; is_solid(of.model) && of_other < resolved; ++of_other)
       least = std::max(least, change[of_other] / (kind(of_other) == kind(k) ? 50 : 1000));
-    r.relative[first + k] = std::max(change[k], least) / share + m.summary.residual_max + round_off;
+    r.relative[first + k] =
+        std::max(change[k], least) / share + m.summary.residual_max + m.round_off[first + k] + round_off;
   }
   return r;
 }
@@ -145,7 +159,8 @@ BoundedModes climb(BoundedModes here, Steps allowed, double fall, const EigenOpt
 }  // namespace
 
 double slowest_fall(const BodyScene& body) {
-  if (body.structure != "solid") return usual_fall;
+  if (body.structure != "solid")
+    return std::ranges::any_of(make_mesh(body.geometry).beam_properties, is_steep) ? taper_fall : usual_fall;
   if (body.solid.slit > 0) return singular_fall;
   const bool own = follows_accuracy(body);
   double slowest = 0;

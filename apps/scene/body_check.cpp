@@ -170,6 +170,7 @@ void check_model(Faults& faults, const std::string& path, const BodyScene& body)
       section_of(segment.end, segment.material.nu, rule);
     }
     check_shapes(faults, path, body);
+    if (body.structure == "beam") body.geometry.validate_stations();
     if (body.structure == "beam" && body.basis.name == "clamped" && !body.modes_auto)
       check_mode_count(faults, path, body);
     if (body.structure == "solid") chosen(body.geometry, body.solid);

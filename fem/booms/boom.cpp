@@ -1,7 +1,6 @@
 #include "fem/booms/boom.hpp"
 
 #include "fem/base/check.hpp"
-#include "fem/base/round_off.hpp"
 #include "fem/mesh/element.hpp"
 #include "fem/mesh/validation.hpp"
 
@@ -32,7 +31,7 @@ void validate_segment(const BeamSegment& segment, const BeamGeometry& boom) {
 
 void validate_attachment(const RigidAttachment& attachment, double boom_length) {
   const double x = attachment.position;
-  require(std::isfinite(x) && x >= 0 && x <= boom_length * (1 + relative_round_off),
+  require(std::isfinite(x) && x >= 0 && x <= boom_length * (1 + same_station),
           fmt::format("position is {} m; the boom reaches from 0 to {} m", x, boom_length));
   validate_rigid(attachment.mass, attachment.inertia, attachment.offset);
 }
@@ -48,7 +47,7 @@ std::vector<double> cuts_of_segment(const BeamGeometry& boom, double start, doub
   for (const RigidAttachment& attachment : boom.attachments) {
     const double s = (attachment.position - start) / length;
     const bool is_new = std::none_of(cuts.begin(), cuts.end(), [&](double cut) {
-      return std::abs(s - cut) * length <= relative_round_off * boom.length();
+      return std::abs(s - cut) * length <= same_station * boom.length();
     });
     if (s > 0 && s < 1 && is_new) cuts.push_back(s);
   }
@@ -126,8 +125,24 @@ void BeamGeometry::validate() const {
   require(mass > 0, "the boom has no mass: rho is zero in every segment and nothing with mass is attached");
 }
 
+void BeamGeometry::validate_stations() const {
+  const double least = shortest_beam * length();
+  double start = 0;
+  for (const BeamSegment& segment : segments) {
+    const std::vector<double> cuts = cuts_of_segment(*this, start, segment.length);
+    for (size_t i = 1; i < cuts.size(); ++i) {
+      const double from = start + cuts[i - 1] * segment.length, piece = (cuts[i] - cuts[i - 1]) * segment.length;
+      require(piece >= least, fmt::format("what begins, ends or is attached at {:.9g} m and {:.3g} m behind it is too "
+                                          "close for beams: put it at one place, or at least {:.3g} m apart",
+                                          from, piece, least));
+    }
+    start += segment.length;
+  }
+}
+
 Mesh make_mesh(const BeamGeometry& boom) {
   boom.validate();
+  boom.validate_stations();
   Chain chain;
   double start = 0;
   for (const BeamSegment& segment : boom.segments) {

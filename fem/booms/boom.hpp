@@ -25,6 +25,13 @@ struct RigidAttachment {
 /// Polynomial orders of beams go from 1 to this.
 inline constexpr int highest_beam_order = 12;
 
+/// Stations of a boom (ends of segments, attachments) closer than this part of its length are one.
+inline constexpr double same_station = 1e-9;
+
+/// Elements of beams have at least this part of the boom's length: the stiffness of one goes by length^-3, and its
+/// round-off would be that of the whole boom.
+inline constexpr double shortest_beam = 1e-5;
+
 /// A boom along +x of its body frame (BRF), root at the origin; y and z are the principal axes of every section.
 struct BeamGeometry {
   std::vector<BeamSegment> segments;
@@ -38,10 +45,13 @@ struct BeamGeometry {
 
   /// @throws InputError naming the first fault (dimension, material, attachment outside the boom, order out of 1..12).
   void validate() const;
+
+  /// @throws InputError where two stations are neither one nor far enough apart for beams (shortest_beam).
+  void validate_stations() const;
 };
 
 /// Mesh of a boom of beams with node sets "root" and "tip" and one node at every segment end and attachment.
-/// @throws InputError as BeamGeometry::validate.
+/// @throws InputError as BeamGeometry::validate and validate_stations.
 Mesh make_mesh(const BeamGeometry&);
 
 }  // namespace flexboom

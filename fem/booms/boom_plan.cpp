@@ -34,7 +34,7 @@ double start_of(const BeamGeometry& boom, int segment) {
 bool holds_body_at_tip(const BeamGeometry& boom) {
   const double length = boom.length();
   return std::any_of(boom.attachments.begin(), boom.attachments.end(),
-                     [&](const RigidAttachment& a) { return a.position >= length * (1 - relative_round_off); });
+                     [&](const RigidAttachment& a) { return a.position >= length * (1 - same_station); });
 }
 
 // ---- runs and their ring lines
@@ -139,7 +139,7 @@ std::vector<double> cuts_of_piece(double length, bool start_graded, bool end_gra
 // Ends of pieces of a segment, relative to its start: attachments inside and its end.
 std::vector<double> piece_ends(const BeamGeometry& boom, double start, double length) {
   std::vector<double> ends;
-  const double tolerance = relative_round_off * boom.length();
+  const double tolerance = same_station * boom.length();
   for (const RigidAttachment& attachment : boom.attachments) {
     const double x = attachment.position - start;
     if (x > tolerance && x < length - tolerance) ends.push_back(x);

@@ -220,7 +220,7 @@ std::vector<int> add_materials(Mesh& mesh, const BeamGeometry& boom) {
 std::vector<int> nodes_at(const Mesh& mesh, double x, double length) {
   std::vector<int> nodes;
   for (Index i = 0; i < mesh.nodes.cols(); ++i) {
-    if (std::abs(mesh.nodes(0, i) - x) <= relative_round_off * length) nodes.push_back(static_cast<int>(i));
+    if (std::abs(mesh.nodes(0, i) - x) <= same_station * length) nodes.push_back(static_cast<int>(i));
   }
   return nodes;
 }
@@ -262,7 +262,7 @@ int add_reference(Mesh& mesh, const std::vector<double>& shares, double x, doubl
   const int reference = static_cast<int>(mesh.nodes.cols());
   mesh.nodes.conservativeResize(3, reference + 1);
   mesh.nodes.col(reference) << x, 0, 0;
-  if (x >= length * (1 - relative_round_off)) {
+  if (x >= length * (1 - same_station)) {
     mesh.rigid_connections.push_back({reference, std::move(section), all_components});
     return reference;
   }
@@ -278,9 +278,8 @@ void add_attachments(Mesh& mesh, const BeamGeometry& boom, const std::vector<dou
   std::vector<std::pair<double, int>> references;  // (position, node): bodies at one place share a node
   for (const RigidAttachment& attachment : boom.attachments) {
     const double x = std::min(attachment.position, length);
-    const auto found = std::find_if(references.begin(), references.end(), [&](const auto& r) {
-      return std::abs(r.first - x) <= relative_round_off * length;
-    });
+    const auto found = std::find_if(references.begin(), references.end(),
+                                    [&](const auto& r) { return std::abs(r.first - x) <= same_station * length; });
     const int node = found != references.end() ? found->second : add_reference(mesh, shares, x, length);
     if (found == references.end()) references.emplace_back(x, node);
     mesh.bodies.push_back({node, attachment.mass, attachment.inertia, attachment.offset});

@@ -31,9 +31,9 @@ void keep_modes(EigenSummary& summary, int count, const NewIndex& new_index) {
   std::erase_if(summary.pairs, [](const std::vector<int>& group) { return group.size() < 2; });
 }
 
-/// phi^T M phi of each column.
-VectorXd modal_masses(const SparseMatrix& M, const MatrixXd& Phi) {
-  return Phi.cwiseProduct(symmetric_product(M, Phi)).colwise().sum();
+/// phi^T A phi of each column.
+VectorXd quadratic_forms(const SparseMatrix& A, const MatrixXd& Phi) {
+  return Phi.cwiseProduct(symmetric_product(A, Phi)).colwise().sum();
 }
 
 /// What the modes of a mesh need of its assembly beside the eigenproblem.
@@ -52,13 +52,46 @@ struct ModalModel {
   VectorXd springs;  // diagonal of K
 };
 
-/// How many shapes at the front store no strain energy: less than the round-off of what their displacements would store
-/// if every freedom were alone. That measure knows neither the size nor the slenderness of the body.
-int strainless(const ModalModel& model, const MatrixXd& Phi, const VectorXd& strain) {
-  const VectorXd alone = Phi.cwiseAbs2().transpose() * model.springs / 2;
+/// Of the strain energies of shapes, what the round-off of K may be: that of what their displacements would store if
+/// every freedom were alone. It knows neither the size nor the slenderness of the body.
+VectorXd energy_round_off(const ModalModel& model, const MatrixXd& Phi) {
+  return std::numeric_limits<double>::epsilon() / 2 * (Phi.cwiseAbs2().transpose() * model.springs);
+}
+
+/// How many shapes at the front store no strain energy: far less than the round-off of K. That of an elastic shape may
+/// be less than round-off too, where an element is very short.
+int strainless(const VectorXd& strain, const VectorXd& round_off) {
+  constexpr double far = 1e-3;
   int count = 0;
-  while (count < strain.size() && strain(count) <= std::numeric_limits<double>::epsilon() * alone(count)) ++count;
+  while (count < strain.size() && strain(count) <= far * round_off(count)) ++count;
   return count;
+}
+
+/// What the round-off of K changes of the frequencies of `basis`, relative. K and M: over the unknowns. Round-off is
+/// seen in phi^T K phi, less the strain energy. It mixes mode k with j by sqrt(n_j n_k) / (lambda_k - lambda_j), where
+/// n is that of an eigenvalue, and the quotient of strain energies changes by the square of that times the gap.
+VectorXd frequency_round_off(const ModalModel& model, const SparseMatrix& K, const SparseMatrix& M,
+                             const std::vector<int>& unknowns, const ModalBasis& basis) {
+  constexpr double lucky = 3;  // times smaller than the round-off may be, seen in two energies by accident
+  // A dense factor adds as many products as there are unknowns, and their round-off, which the energies do not show.
+  const double sums = basis.summary.backend == "dense" ? std::sqrt(static_cast<double>(K.rows())) : 1;
+  const MatrixXd Phi = basis.Phi(unknowns, Eigen::all);
+  const VectorXd strain = basis.omega.cwiseAbs2().cwiseProduct(quadratic_forms(M, Phi)) / 2;
+  const VectorXd by_K = quadratic_forms(K, Phi) / 2, may_be = sums / lucky * energy_round_off(model, basis.Phi);
+  const VectorXd lambda = basis.omega.cwiseAbs2();
+  const auto noise = [&](Index k) {
+    return std::max(std::abs(by_K(k) - strain(k)), may_be(k)) / strain(k) * lambda(k);
+  };
+  VectorXd r = VectorXd::Zero(strain.size());
+  for (Index k = basis.rigid_freedoms; k < r.size(); ++k) {
+    double change = noise(k) * noise(k) / lambda(k);  // by all modes that are much higher
+    for (Index j = basis.rigid_freedoms; j < r.size(); ++j) {
+      const double gap = std::abs(lambda(k) - lambda(j));
+      if (gap > 0) change += std::min(noise(k) * noise(j) / gap, gap);
+    }
+    r(k) = change / lambda(k);
+  }
+  return r;
 }
 
 /// The first `wanted` modes over all freedoms of the mesh, aligned, of the right sign and size. Rigid motions, if any,
@@ -76,7 +109,7 @@ ModalBasis finished(const ModalModel& model, MatrixXd Phi, const Masses& masses_
   // digits.
   const VectorXd strain = strain_energies(model.mesh, model.dofs, basis.Phi, threads);
   basis.omega = (2 * strain).cwiseQuotient(masses_of(basis.Phi)).cwiseMax(0).cwiseSqrt();
-  basis.rigid_freedoms = std::max(rigid, strainless(model, basis.Phi, strain));
+  basis.rigid_freedoms = std::max(rigid, strainless(strain, energy_round_off(model, basis.Phi)));
   basis.frame = basis.rigid_freedoms == 0 ? "clamped" : "free";
   basis.kind = mode_kinds(model.mesh, model.dofs, model.weights, basis.Phi);
   std::fill_n(basis.kind.begin(), std::min(basis.rigid_freedoms, wanted), ModeKind::rigid);
@@ -151,11 +184,12 @@ ModalBasis modes_of(const ModalModel& model, const Clamp& clamp, const Reduced& 
   const MatrixXd start = smooth_shapes(model.mesh, model.dofs)(reduced.unknowns.free_dofs(), Eigen::all);
   const EigenPairs pairs = solve_modes({reduced.K, reduced.M, rigid > 0, start}, whole);
   const auto masses_of = [&](const MatrixXd& Phi) {
-    return modal_masses(reduced.M, Phi(reduced.unknowns.free_dofs(), Eigen::all));
+    return quadratic_forms(reduced.M, Phi(reduced.unknowns.free_dofs(), Eigen::all));
   };
   MatrixXd Phi = reduced.unknowns.expanded(pairs.Phi);
   const EigenSummary summary = with_equal_energies(model, Phi, pairs.lambda, pairs.summary, threads);
   ModalBasis basis = finished(model, std::move(Phi), masses_of, summary, options.num_modes, rigid, threads);
+  basis.round_off = frequency_round_off(model, reduced.K, reduced.M, reduced.unknowns.free_dofs(), basis);
   basis.unknowns = count;
   basis.factor = pairs.factor;
   set_clamped_interface(basis, model.mesh, clamp);
@@ -189,6 +223,7 @@ ModalBasis selected(const ModalBasis& basis, const std::vector<int>& modes) {
   ModalBasis result = basis;
   result.Phi = basis.Phi(Eigen::all, modes);
   result.omega = basis.omega(modes);
+  if (basis.round_off.size() > 0) result.round_off = basis.round_off(modes);
   result.kind.clear();
   result.coordinates.clear();
   for (const int i : modes) {
@@ -221,7 +256,7 @@ ModalBasis ritz_modes(const Mesh& mesh, const Assembly& assembly, const Clamp& c
   summary.rigid_modes = rigid;
   summary.pairs = equal_groups((mu.cwiseInverse().array() - shift).cwiseMax(0).sqrt());
   std::erase_if(summary.pairs, [rigid](const auto& group) { return group.front() < rigid; });
-  const auto masses_of = [&](const MatrixXd& Phi) { return modal_masses(assembly.M, Phi); };
+  const auto masses_of = [&](const MatrixXd& Phi) { return quadratic_forms(assembly.M, Phi); };
   ModalBasis basis = finished(ModalModel(mesh, assembly, clamp), X * V, masses_of, summary, static_cast<int>(X.cols()),
                               rigid, threads);
   set_clamped_interface(basis, mesh, clamp);

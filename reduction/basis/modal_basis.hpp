@@ -18,7 +18,8 @@ namespace flexboom {
 struct ModalBasis {
   Eigen::MatrixXd Phi;    // freedoms x n
   Eigen::VectorXd omega;  // [rad/s], of modes ascending, within a group of equal frequencies to round-off; interface: 0
-  std::vector<ModeKind> kind;  // one per shape
+  std::vector<ModeKind> kind;   // one per shape
+  Eigen::VectorXd round_off{};  // what the round-off of K changes of each frequency, relative; empty: not looked for
   EigenSummary summary;
   double mass = 0;                      // of the whole mesh [kg]
   int unknowns = 0;                     // freedoms left in the eigenproblem

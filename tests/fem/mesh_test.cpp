@@ -52,6 +52,26 @@ TEST(MakeMesh, TaperContinuesAcrossElements) {
   }
 }
 
+/// Positions that are computed elsewhere miss a joint by their last digits.
+TEST(MakeMesh, StationsAreOneOrFarEnoughApart) {
+  BeamGeometry boom = two_segments();
+  const size_t plain = make_mesh(boom).elements.size();
+  boom.attachments = {sensor(0.1 + 0.9 * same_station * 0.4), sensor(0.4 * (1 + 0.9 * same_station))};
+  boom.attachments[1].name = "";
+  const Mesh mesh = make_mesh(boom);
+  EXPECT_EQ(mesh.elements.size(), plain);
+  EXPECT_EQ(mesh.bodies[1].node, node_set(mesh, "tip")[0]);
+  boom.attachments = {sensor(0.1 + 1.1 * shortest_beam * 0.4)};
+  EXPECT_EQ(make_mesh(boom).elements.size(), plain + 1);
+  for (const double gap : {1.1 * same_station, 0.9 * shortest_beam}) {
+    for (const double position : {0.1 + gap * 0.4, 0.1 - gap * 0.4, gap * 0.4, (1 - gap) * 0.4}) {
+      boom.attachments = {sensor(position)};
+      const std::string message = input_error([&] { make_mesh(boom); });
+      EXPECT_NE(message.find("at one place, or at least 4e-06 m apart"), std::string::npos) << message;
+    }
+  }
+}
+
 TEST(MakeMesh, AttachmentAtSegmentEndNeedsNoNewNode) {
   BeamGeometry boom = two_segments();
   const size_t plain = make_mesh(boom).elements.size();

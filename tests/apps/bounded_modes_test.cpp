@@ -1,0 +1,91 @@
+// Bounds of frequencies hold where elements are short beside the boom, and where it tapers to an edge.
+
+#include "apps/model/bounded_modes.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+namespace flexboom {
+namespace {
+
+constexpr int count = 8;
+
+struct Piece {
+  double length, height = 0.03, end_height = 0.03, width = 0.012, end_width = 0.012;
+};
+
+/// Modes of a boom of rectangles; `keys` of the body.
+BoundedModes modes_of(const std::vector<Piece>& pieces, const std::string& keys, const std::string& backend = "auto") {
+  std::string text = "format = \"flexboom-body-1\"\nname = \"boom\"\ndirections = \"all\"\n" + keys;
+  for (const Piece& p : pieces)
+    text += fmt::format(
+        "\n[[segments]]\nshape = \"rectangle\"\nlength = {:.17g}\nheight = {}\nwidth = {}\nend = {{ height = {}, width "
+        "= "
+        "{} }}\nmaterial = {{ E = 70e9, nu = 0.33, rho = 2700 }}",
+        p.length, p.height, p.width, p.end_height, p.end_width);
+  const auto file = std::filesystem::temp_directory_path() / fmt::format("flexboom-bounded-{}.toml", ::getpid());
+  std::ofstream(file) << text << "\n";
+  const Model model = load_model(file, {});
+  std::filesystem::remove(file);
+  return bounded_modes(model, {.num_modes = count, .sigma = {}, .backend = backend}, 1);
+}
+
+/// Every error of `modes` is within its bound; `exact` [rad/s]. Returns how many bounds are known.
+int expect_bounds_hold(const BoundedModes& modes, const Eigen::VectorXd& exact, const std::string& what) {
+  int known = 0;
+  for (int k = 0; k < count; ++k) {
+    if (std::isnan(modes.bounds.relative[k])) continue;
+    ++known;
+    const double round_off = 1e-11;  // of the reference
+    EXPECT_LT(std::abs(modes.basis.omega[k] / exact[k] - 1), modes.bounds.relative[k] + round_off) << what << ", " << k;
+  }
+  return known;
+}
+
+TEST(BoundedModes, HoldHoweverShortAnElementIs) {
+  const Eigen::VectorXd exact = modes_of({{0.8}}, "order = 10").basis.omega;
+  for (const double gap : {1e-2, 1e-3, 1e-4, 3e-5, 1e-5, 8.1e-6})
+    for (const double at : {0.1, 0.4, 0.7})
+      for (const std::string backend : {"auto", "block", "dense"}) {
+        const BoundedModes modes = modes_of({{at}, {gap}, {0.8 - at - gap}}, "order = 6", backend);
+        EXPECT_EQ(modes.basis.rigid_freedoms, 0) << gap;
+        const int known = expect_bounds_hold(modes, exact, fmt::format("{} m at {} m, {}", gap, at, backend));
+        if (gap >= 1e-4) {
+          EXPECT_EQ(known, count);
+        }
+      }
+}
+
+TEST(BoundedModes, HoldOfSteepTapers) {
+  for (const bool wide : {true, false}) {
+    const auto piece = [&](double from, double to) {  // of a boom of 0.4 m
+      const double a = 1 - 0.99 * from / 0.4, b = 1 - 0.99 * to / 0.4;
+      return wide ? Piece{to - from, 0.03, 0.03, 0.012 * a, 0.012 * b} : Piece{to - from, 0.03 * a, 0.03 * b};
+    };
+    std::vector<Piece> graded;
+    double from = 0;
+    for (int k = 1; k <= 8; ++k) {
+      const double to = k == 8 ? 0.4 : 0.4 * (1 - std::pow(2.0, -k));
+      graded.push_back(piece(from, to)), from = to;
+    }
+    const Eigen::VectorXd exact = modes_of(graded, "order = 11").basis.omega;
+    for (const int elements : {0, 1, 2, 5, 10})
+      for (const int order : {2, 3, 4, 5, 8}) {
+        const std::string keys = fmt::format("order = {}", order);
+        std::vector<Piece> pieces;
+        const int n = elements == 0 ? 8 : elements;
+        for (int k = 0; k < n; ++k) pieces.push_back(piece(0.4 * k / n, 0.4 * (k + 1) / n));
+        expect_bounds_hold(modes_of(pieces, keys), exact, fmt::format("{} elements of order {}", n, order));
+      }
+  }
+}
+
+}  // namespace
+}  // namespace flexboom
