@@ -15,6 +15,7 @@
 #include <numeric>
 #include <set>
 #include <string_view>
+#include <utility>
 
 namespace flexboom {
 namespace {
@@ -152,6 +153,35 @@ void validate_elements(const Mesh& mesh, int threads) {
   }
 }
 
+/// Pairs of elements that have all nodes in common, those of lines or the others; the first of a pair is the earlier.
+std::vector<std::pair<int, int>> twins(const Mesh& mesh, bool lines) {
+  struct Key {
+    int least;
+    long sum;
+    int element;
+    auto operator<=>(const Key&) const = default;
+  };
+  std::vector<Key> keys;
+  for (int e = 0; e < std::ssize(mesh.elements); ++e) {
+    const Element& element = mesh.elements[static_cast<size_t>(e)];
+    if ((type_of(element).shape == Shape::line) != lines) continue;
+    keys.push_back(
+        {std::ranges::min(element.nodes), std::accumulate(element.nodes.begin(), element.nodes.end(), 0L), e});
+  }
+  std::ranges::sort(keys);
+  const auto sorted_nodes = [&](const Key& key) {
+    std::vector<int> nodes = mesh.elements[static_cast<size_t>(key.element)].nodes;
+    std::ranges::sort(nodes);
+    return nodes;
+  };
+  std::vector<std::pair<int, int>> pairs;
+  for (size_t i = 0; i < keys.size(); ++i)
+    for (size_t k = i + 1; k < keys.size() && keys[k].least == keys[i].least && keys[k].sum == keys[i].sum; ++k)
+      if (sorted_nodes(keys[i]) == sorted_nodes(keys[k])) pairs.emplace_back(keys[i].element, keys[k].element);
+  std::ranges::sort(pairs);
+  return pairs;
+}
+
 void validate_content(const Mesh& mesh, int threads) {
   for (Index i = 0; i < mesh.nodes.cols(); ++i) {
     require(mesh.nodes.col(i).allFinite(),
@@ -159,6 +189,10 @@ void validate_content(const Mesh& mesh, int threads) {
   }
   validate_properties(mesh);
   validate_elements(mesh, threads);
+  if (const auto twice = twins(mesh, false); !twice.empty())
+    throw InputError(fmt::format(
+        "{} and {} have the same nodes: that part of the body would count twice ({} such pairs); delete one",
+        element_name(mesh, twice.front().first), element_name(mesh, twice.front().second), twice.size()));
   validate_connections(mesh);
   for (size_t i = 0; i < mesh.bodies.size(); ++i) {
     within(fmt::format("bodies[{}]", i), [&] {
@@ -283,6 +317,10 @@ std::vector<std::string> suspicions(const Mesh& mesh) {
         fmt::format("{} pairs of nodes lie at one place and nothing joins them: the mesh is open there "
                     "(merge them if it should not be)",
                     twins));
+  if (const auto twice = twins(mesh, true); !twice.empty())
+    result.push_back(fmt::format("{} pairs of beams have the same nodes and lie side by side; the first are {} and {}",
+                                 twice.size(), element_name(mesh, twice.front().first),
+                                 element_name(mesh, twice.front().second)));
   const auto judge = [&result](const std::string& where, const Material& m) {
     if (const std::string odd = suspicion(m); !odd.empty()) result.push_back(where + ": " + odd);
   };

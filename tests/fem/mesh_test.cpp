@@ -1,3 +1,4 @@
+#include "fem/booms/solid_boom.hpp"
 #include "fem_testing.hpp"
 
 #include <fmt/format.h>
@@ -214,6 +215,31 @@ TEST(Mesh, CoincidentNodesAndMixedUpUnitsAreSuspicious) {
   for (BeamProperty& p : millimetres.beam_properties) p.material.rho = 2.84e-9;  // t/mm^3
   ASSERT_FALSE(suspicions(millimetres).empty());
   EXPECT_NE(suspicions(millimetres)[0].find("units mixed up"), std::string::npos);
+}
+
+TEST(Mesh, BeamsSideBySideAreSuspicious) {
+  Mesh mesh = make_mesh(two_segments());
+  mesh.elements.push_back(mesh.elements[2]);
+  std::ranges::reverse(mesh.elements.back().nodes);
+  mesh.validate();
+  ASSERT_EQ(suspicions(mesh).size(), 1U);
+  EXPECT_EQ(suspicions(mesh)[0],
+            "1 pairs of beams have the same nodes and lie side by side; the first are beam-timoshenko element 2 and "
+            "beam-timoshenko element 8");
+}
+
+TEST(Mesh, SolidsThatCountTwiceAreRefused) {
+  for (const char* element : {"hex", "hex8", "hex20", "tet10"}) {
+    Mesh mesh = make_solid_mesh(two_segments(), {.element = element});
+    mesh.validate();
+    const std::size_t count = mesh.elements.size();
+    mesh.elements.push_back(mesh.elements[2]);
+    mesh.elements.push_back(mesh.elements[4]);
+    EXPECT_EQ(input_error([&] { mesh.validate(); }),
+              fmt::format("mesh: {0} element 2 and {0} element {1} have the same nodes: that part of the body would "
+                          "count twice (2 such pairs); delete one",
+                          element, count));
+  }
 }
 
 TEST(Mesh, UnknownNodeSetListsThoseThatExist) {
