@@ -81,6 +81,19 @@ TEST(Nastran, ZeroCoefficientsOfMpcsAreSaid) {
   EXPECT_TRUE(has_note(read(small + "MPC,1,1,1,1.,2,1,0.\n"), "coefficient zero"));
 }
 
+TEST(Nastran, ADeckThatIsCutOffIsSaid) {
+  const std::string whole = "SOL 103\nCEND\nBEGIN BULK\n" + small;
+  EXPECT_TRUE(has_note(read(whole), "no ENDDATA"));
+  EXPECT_FALSE(has_note(read(whole + "ENDDATA\n"), "no ENDDATA"));
+  EXPECT_FALSE(has_note(read(small), "no ENDDATA")) << "bulk data alone, as in a file that is included";
+}
+
+TEST(Nastran, MassesThatCannotBeAreNamed) {
+  const std::string message = input_error([] { read(small + "CONM2,9,1,,2.,,,,\n,1.,,1.,,,9.\n"); });
+  EXPECT_TRUE(message.starts_with("deck.bdf:")) << message;
+  EXPECT_NE(message.find("CONM2: inertia breaks the triangle inequality"), std::string::npos) << message;
+}
+
 TEST(Nastran, CaseControlSelectsSupportsAndModes) {
   const std::string sets =
       "SPC1,2,123,1,THRU,4\nSPC,3,5,13,0.,4,2,0.1\nSPCADD,9,2,3\nEIGRL,1,,,6\nEIGRL,5,0.1,,8\nENDDATA\nJUNK\n";

@@ -79,7 +79,10 @@ void Cards::read_case_control(std::string_view text) {
     text_.skip_line();
     const std::string_view stripped = trimmed(line->substr(0, line->find('$')));
     const std::string key = upper_key(stripped);
-    if (key.starts_with("BEGIN")) return;
+    if (key.starts_with("BEGIN")) {
+      has_begin_ = true;
+      return;
+    }
     if (key.starts_with(include_word)) {
       include(stripped);
       continue;
@@ -147,7 +150,10 @@ bool Cards::next_line(std::string_view& line) {
       include(word);
       continue;
     }
-    if (may_be_mark && upper_key(word) == "ENDDATA") return false;
+    if (may_be_mark && upper_key(word) == "ENDDATA") {
+      has_end_ = true;
+      return false;
+    }
     line = stripped;
     return true;
   }

@@ -42,6 +42,9 @@ class Cards {
   const CaseControl& case_control() const { return case_; }
   const std::vector<std::string>& case_notes() const { return case_notes_; }
 
+  /// Has a deck with BEGIN BULK come to its end without ENDDATA?
+  bool is_cut_off() const { return has_begin_ && !has_end_; }
+
   /// The next card, or null at the end of the bulk data. Good until the next call.
   const Card* next();
 
@@ -69,6 +72,7 @@ class Cards {
 
   DeckText text_;
   CaseControl case_;
+  bool has_begin_ = false, has_end_ = false;  // of the bulk data
   std::vector<std::string> case_notes_;
   Card card_;
   std::string_view mark_;  // at the end of the last line of the card

@@ -2,6 +2,7 @@
 #include "fem/formats/deck/nodes.hpp"
 #include "fem/formats/nastran/bulk.hpp"
 #include "fem/mesh/mesh_sets.hpp"
+#include "fem/mesh/validation.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -88,6 +89,11 @@ void Connections::add_masses() {
     body.inertia *= bulk_.mass_factor;
     if (!rotates[at(body.node)] && !(body.inertia.isZero(0) && body.offset.isZero(0)))
       bulk_.notes.add("CONM2 on a grid without rotations acts as a point mass");
+    try {
+      validate_rigid(body.mass, body.inertia, body.offset);
+    } catch (const InputError& error) {
+      bulk_.fail(line.at, fmt::format("CONM2: {}", error.what()));
+    }
     mesh_.bodies.push_back(body);
   }
 }

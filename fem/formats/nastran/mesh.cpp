@@ -232,6 +232,7 @@ MeshFile mesh_of(Bulk& bulk) {
   add_connections(bulk, mesh);
   select_modes(bulk, file);
   file.notes = bulk.cards.case_notes();
+  if (bulk.cards.is_cut_off()) file.notes.emplace_back("the deck has no ENDDATA: is it whole?");
   file.notes.insert(file.notes.end(), bulk.notes.list().begin(), bulk.notes.list().end());
   drop_unused_nodes(file.mesh, file.notes);
   return file;
