@@ -41,7 +41,9 @@ WantedOutput wanted_output(const std::string& text) {
                                   text));
   const std::string_view unit = unit_of(r.name);
   require(r.unit.empty() || r.unit == unit,
-          unit.empty() ? fmt::format("is '{}', but {} has no unit; give a relative error", text, r.name)
+          unit.empty() ? fmt::format("is '{}', but {} is no output that has a unit; give a relative error, or "
+                                     "check the name",
+                                     text, r.name)
                        : fmt::format("is '{}', but {} is in {}", text, r.name, unit));
   return r;
 }
