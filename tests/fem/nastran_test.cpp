@@ -216,6 +216,22 @@ TEST(Nastran, MassesWithOffsetAndProducts) {
   EXPECT_NEAR((absolute.bodies[0].offset - Vector3d(.1, .2, .3)).norm(), 0, 1e-15);
 }
 
+/// A dependent grid has no rotations of its own: what is fixed to it is fixed to the grid that it follows.
+TEST(Nastran, MassesOnDependentGridsKeepInertiaAndOffset) {
+  const std::string beam = mast + "PBAR,8,3,.01,4.-5,1.-5,2.-5\nCBAR,1,8,1,2,1.,0.,0.\nGRID,20,,3.,4.,5.\n";
+  const std::string mass = "CONM2,9,20,,5.,.1,.2,.3,\n,3.,.1,4.,.2,.3,5.\n";
+  for (const char* rigid : {"RBE2,40,2,123456,20\n", "RBAR,40,2,20,123456,,,123456\n"}) {
+    const MeshFile file = read(beam + rigid + mass);
+    ASSERT_EQ(file.mesh.bodies.size(), 1U);
+    const NodalBody& body = file.mesh.bodies[0];
+    EXPECT_EQ(body.node, node_labelled(file.mesh, 2));
+    EXPECT_EQ(body.offset, Vector3d(3.1, 4.2, 5.3) - file.mesh.nodes.col(body.node));
+    EXPECT_EQ(body.inertia(1, 1), 4);
+    EXPECT_FALSE(has_note(file, "point mass"));
+  }
+  EXPECT_TRUE(has_note(read(beam + "RBE2,40,2,123,20\n" + mass), "point mass")) << "its rotations follow nothing";
+}
+
 TEST(Nastran, RigidElements) {
   const std::string hub = small + "GRID,20,,3.,3.,3.\nCONM2,30,20,,5.\n";
   const Mesh rigid = read(hub + "RBE2,40,20,123,1,2,4,1.2-5\n").mesh;

@@ -27,6 +27,9 @@ class Connections {
   std::vector<int> nodes(const std::vector<IdRange>&);
   void add_rigid(const RigidLine&);
   void add_average(const RigidLine&);
+  /// Of each grid that moves as one with another in all six components, that grid; -1 of the others. What is fixed to a
+  /// dependent grid is fixed to its reference, which has rotations.
+  std::vector<int> references() const;
   void add_masses();
   void add_mpcs();
   void add_supports();
@@ -79,12 +82,26 @@ void Connections::add_average(const RigidLine& line) {
   mesh_.distributing_connections.push_back(std::move(connection));
 }
 
+std::vector<int> Connections::references() const {
+  std::vector<int> references(at(static_cast<int>(mesh_.nodes.cols())), -1);
+  for (const RigidConnection& c : mesh_.rigid_connections) {
+    if (c.components != all_components) continue;
+    for (const int node : c.nodes) references[at(node)] = c.reference;
+  }
+  return references;
+}
+
 void Connections::add_masses() {
   const std::vector<char> rotates = nodes_that_rotate(mesh_);
+  const std::vector<int> reference = references();
   for (const MassLine& line : bulk_.masses) {
     NodalBody body = line.body;
     body.node = node_of(bulk_, line.node, line.at);
     if (line.absolute) body.offset -= mesh_.nodes.col(body.node);
+    if (const int to = reference[at(body.node)]; to >= 0 && !rotates[at(body.node)]) {
+      body.offset += mesh_.nodes.col(body.node) - mesh_.nodes.col(to);
+      body.node = to;
+    }
     body.mass *= bulk_.mass_factor;
     body.inertia *= bulk_.mass_factor;
     if (!rotates[at(body.node)] && !(body.inertia.isZero(0) && body.offset.isZero(0)))
