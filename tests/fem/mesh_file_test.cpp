@@ -142,6 +142,7 @@ Mesh clamped(std::string_view row, int order) {
   for (BeamProperty& property : mesh.beam_properties) {
     property.rotary_inertia = true;
     property.end = property.start;
+    property.shear = {};
   }
   return mesh;
 }
@@ -251,6 +252,21 @@ TEST(WriteAbaqus, WhatADeckCannotHoldIsAnInputError) {
                     m.rigid_connections.push_back({1, {2}, {true, false, true}});
                   }),
             "the rigid connection of node 1 leaves displacements free, which *RIGID BODY cannot");
+  const auto pinned = [](Mesh& m) { m.rigid_connections.push_back({1, {2}, {true, true, true, true, true, false}}); };
+  Mesh solid = tet;
+  pinned(solid);
+  EXPECT_NO_THROW(deck_of(solid)) << "nodes of solids have no rotations";
+  EXPECT_EQ(fault(beam, pinned),
+            "the rigid connection of node 1 leaves rotations of beams free, which *RIGID BODY cannot");
+  EXPECT_EQ(
+      fault(clamped("hex", 2), pinned),
+      "hex element 0 of order 2 has no type in CalculiX; take elements that have one (hex20, tet10): other formats "
+      "hold no connections");
+  EXPECT_EQ(fault(beam,
+                  [](Mesh& m) {
+                    m.beam_properties[0].shear = {"value", 0.5};
+                  }),
+            "beam property 0 has a shear coefficient of its own, which no deck holds");
   EXPECT_EQ(fault(tet, [](Mesh& m) { m.solid_properties[0].material = {}; }),
             "material steel_part is missing; give E, nu and rho (--material E,nu,rho)");
   EXPECT_EQ(fault(tet, [](Mesh& m) { m.node_sets["ROOT"] = {3}; }),

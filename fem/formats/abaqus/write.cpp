@@ -67,7 +67,10 @@ class DeckWriter {
   explicit DeckWriter(const Mesh& mesh)
       : mesh_(mesh),
         nodes_(file_labels(mesh.node_labels, static_cast<size_t>(mesh.nodes.cols()))),
-        elements_(file_labels(mesh.element_labels, mesh.elements.size())) {}
+        elements_(file_labels(mesh.element_labels, mesh.elements.size())) {
+    for (const Element& element : mesh.elements)
+      if (type_of(element).shape == Shape::line) of_beams_.insert(element.nodes.begin(), element.nodes.end());
+  }
 
   std::string text(std::optional<int> modes) {
     require(!mesh_.elements.empty(), "the mesh has no elements");
@@ -114,6 +117,7 @@ class DeckWriter {
   const Mesh& mesh_;
   std::vector<long> nodes_, elements_;  // labels
   std::map<int, long> rotation_nodes_;  // of the references of rigid connections
+  std::set<int> of_beams_;              // nodes
   long next_element_ = 0;
   std::string text_;
 };
@@ -142,8 +146,11 @@ std::string_view DeckWriter::deck_row(size_t e) const {
   const std::string_view row = type_of(element).name;
   if (row == "hex" && element.order == 1) return "C3D8I";
   const auto* const found = std::ranges::find(deck_rows, row, &DeckRow::row);
+  const bool is_connected = !mesh_.rigid_connections.empty() || !mesh_.equations.empty();  // only decks hold that
   require(found != deck_rows.end(),
-          fmt::format("{} of order {} has no type in CalculiX; write .vtu or .msh", name_of(e), element.order));
+          fmt::format("{} of order {} has no type in CalculiX; {}", name_of(e), element.order,
+                      is_connected ? "take elements that have one (hex20, tet10): other formats hold no connections"
+                                   : "write .vtu or .msh"));
   return found->deck;
 }
 
@@ -238,6 +245,7 @@ void DeckWriter::write_beam_section(size_t i) {
   const BeamProperty& property = mesh_.beam_properties[i];
   const auto where = [i](const char* what) { return fmt::format("beam property {} {}", i, what); };
   require(property.rotary_inertia, where("is without rotary inertia, which B31 always has"));
+  require(property.shear.name == ShearRule{}.name, where("has a shear coefficient of its own, which no deck holds"));
   const SectionShape middle = interpolate(property.start, property.end, 0.5);
   if (const auto* bar = std::get_if<RoundBar>(&property.start)) {
     require(std::get<RoundBar>(middle).diameter == bar->diameter, where("is tapered, which no deck holds"));
@@ -264,11 +272,17 @@ void DeckWriter::write_beam_section(size_t i) {
 
 void DeckWriter::write_rigid(size_t i) {
   const RigidConnection& connection = mesh_.rigid_connections[i];
-  const bool whole = connection.components[0] && connection.components[1] && connection.components[2];
-  require(whole, fmt::format("the rigid connection of node {} leaves displacements free, which *RIGID BODY cannot",
-                             mesh_.node_label(connection.reference)));
+  const auto lacks = [&](const char* what) {
+    return fmt::format("the rigid connection of node {} leaves {} free, which *RIGID BODY cannot",
+                       mesh_.node_label(connection.reference), what);
+  };
+  const Components& c = connection.components;
+  require(c[0] && c[1] && c[2], lacks("displacements"));
   std::vector<long> numbers;
-  for (const int n : connection.nodes) numbers.push_back(node(n));
+  for (const int n : connection.nodes) {
+    require((c[3] && c[4] && c[5]) || !of_beams_.contains(n), lacks("rotations of beams"));
+    numbers.push_back(node(n));
+  }
   put("*NSET, NSET=RIGID_{}\n", i + 1);
   write_numbers(numbers);
   put("*RIGID BODY, NSET=RIGID_{}, REF NODE={}, ROT NODE={}\n", i + 1, node(connection.reference),
@@ -285,10 +299,6 @@ void DeckWriter::write_equations() {
 
 void DeckWriter::write_supports() {
   if (mesh_.supports.empty()) return;
-  std::set<int> of_beams;
-  for (const Element& element : mesh_.elements) {
-    if (type_of(element).shape == Shape::line) of_beams.insert(element.nodes.begin(), element.nodes.end());
-  }
   text_ += "*BOUNDARY\n";
   for (const Support& support : mesh_.supports) {
     const auto rotation = rotation_nodes_.find(support.node);
@@ -296,7 +306,7 @@ void DeckWriter::write_supports() {
       if (!support.components[static_cast<size_t>(k)]) continue;
       if (k >= 3 && rotation != rotation_nodes_.end())
         put("{0}, {1}, {1}\n", rotation->second, k - 2);
-      else if (k < 3 || of_beams.contains(support.node))
+      else if (k < 3 || of_beams_.contains(support.node))
         put("{0}, {1}, {1}\n", node(support.node), k + 1);
     }
   }
