@@ -72,6 +72,17 @@ INSTANTIATE_TEST_SUITE_P(
                                  held_rotations, 0, 1}),
     [](const auto& difference) { return difference.param.name; });
 
+TEST(Abaqus, NodesOfASurfaceHaveOneArea) {
+  const auto text = [](const std::string& first, const std::string& second) {
+    return cube + "*NODE\n20, 0.5, 0.5, 3\n*SURFACE, NAME=Top, TYPE=NODE\n5" + first + "\n6" + second +
+           "\n7\n*COUPLING, REF NODE=20, SURFACE=Top, CONSTRAINT NAME=C\n*KINEMATIC\n1, 6\n";
+  };
+  EXPECT_EQ(read(text("", ", 1.")).mesh.rigid_connections[0].nodes.size(), 3U);
+  const std::string message = input_error([&] { read(text("", ", 2.5")); });
+  EXPECT_TRUE(says(message, "different areas")) << message;
+  EXPECT_TRUE(says(message, "2.5") || says(message, ":4")) << message;
+}
+
 TEST(Abaqus, KinematicWithoutFreedomsNeedsADialect) {
   const std::string text =
       cube + with_reference + "*COUPLING, REF NODE=20, SURFACE=Top, CONSTRAINT NAME=C\n*KINEMATIC\n";

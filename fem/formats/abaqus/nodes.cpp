@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 // Nodes, elements, sets, surfaces, and the part that they may stand in.
 namespace flexboom::abaqus {
@@ -242,8 +243,16 @@ void read_surface(Deck& deck, const Keyword& keyword) {
   if (!surface.name.empty()) deck.fail(keyword.at, fmt::format("surface {} is defined twice", quoted(name)));
   surface.name = name;
   surface.at = keyword.at;
+  std::optional<double> area;  // of each node
   while (const Fields* fields = deck.lines.next_data()) {
     int face = 0;
+    if (type == "NODE") {
+      const double here = fields->size() > 1 && !(*fields)[1].empty() ? deck.real_or_zero(*fields, 1, "area") : 1;
+      if (here != area.value_or(here))
+        deck.fail(fields->back(),
+                  "nodes of a surface with different areas are not understood: programs weight them in different ways");
+      area = here;
+    }
     if (type == "ELEMENT") {
       const std::string label = fields->size() > 1 ? upper_key((*fields)[1]) : "";
       if (label.size() != 2 || label[0] != 'S' || label[1] < '1' || label[1] > '6')
