@@ -16,9 +16,6 @@ constexpr std::array<std::string_view, 6> loads = {"Fx", "Fy", "Fz", "Mx", "My",
 
 /// A node at the centre of others that holds them or follows them.
 int add_reference_node(Mesh& mesh, const std::vector<int>& nodes, const InterfacePlan& plan) {
-  require(plan.connection == "rigid" || plan.connection == "distributing",
-          "interface \"" + plan.name + "\": connection \"" + plan.connection +
-              R"(" is unknown; there are "rigid" and "distributing")");
   const auto reference = static_cast<int>(mesh.nodes.cols());
   const Eigen::Vector3d centre = mesh.nodes(Eigen::all, nodes).rowwise().mean();
   mesh.nodes.conservativeResize(Eigen::NoChange, reference + 1);
@@ -39,6 +36,9 @@ std::vector<InterfaceNode> place_interfaces(Mesh& mesh, const std::vector<Interf
   std::set<std::string> names;
   for (const InterfacePlan& plan : plans) {
     require(names.insert(plan.name).second, "interface \"" + plan.name + "\" is given twice");
+    require(plan.connection == "rigid" || plan.connection == "distributing",
+            "interface \"" + plan.name + "\": connection \"" + plan.connection +
+                R"(" is unknown; there are "rigid" and "distributing")");
     const std::vector<int> nodes = node_set(mesh, plan.node_set);
     require(!nodes.empty(), "interface \"" + plan.name + "\": node set \"" + plan.node_set + "\" is empty");
     const int node = nodes.size() == 1 ? nodes.front() : add_reference_node(mesh, nodes, plan);
