@@ -42,6 +42,10 @@ ModalBasis no_shapes(const BasisModel& m, const char* frame) {
 
 ModalBasis clamped_basis(const Mesh& mesh, const BasisModel& m, const BasisOptions& o, int threads) {
   if (o.modes == 0) return no_shapes(m, "clamped");
+  const int loose = rigid_freedoms(mesh, m.assembly.dofs, m.clamp);
+  require(loose == 0, fmt::format("basis clamped: {} rigid motions of the body are not held, and its frame cannot have "
+                                  "them twice; clamp it (--clamp SET), or take the basis mean-axis",
+                                  loose));
   if (!o.in_plane) return clamped_modes(mesh, m.assembly, m.clamp, eigen_options(o), threads);
   return clamped_modes_of_kind(mesh, m.assembly, m.clamp, o.modes, kinds_of(o), eigen_options(o));
 }

@@ -67,8 +67,8 @@ std::vector<int> listed_modes(const ReducedBody& body, std::vector<int> list) {
   std::ranges::sort(list);
   for (size_t i = 0; i < list.size(); ++i) {
     require(list[i] >= 0 && list[i] < body.n(),
-            fmt::format("modes: {} is not a coordinate; there are 0 to {}", list[i], body.n() - 1));
-    require(i == 0 || list[i] != list[i - 1], fmt::format("modes: {} is given twice", list[i]));
+            fmt::format("modes: {} is not a coordinate; there are 1 to {}", list[i] + 1, body.n()));
+    require(i == 0 || list[i] != list[i - 1], fmt::format("modes: {} is given twice", list[i] + 1));
   }
   return list;
 }
