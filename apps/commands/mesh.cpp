@@ -9,8 +9,11 @@ namespace flexboom {
 using nlohmann::ordered_json;
 
 int mesh_command(const MeshArguments& a, const CommonOptions& common) {
-  const Model model = load_model(a.body, a.options);
+  Model model = load_model(a.body, a.options);
   write_mesh(a.file, model.mesh);
+  if (!model.clamped.empty())
+    model.notes.push_back(
+        fmt::format("the file does not say that \"{0}\" is held; its modes take --clamp {0}", model.clamped));
   const Mesh& mesh = model.mesh;
   if (common.json) {
     ordered_json sets;

@@ -158,6 +158,7 @@ EigenOptions eigen_options(const ModesArguments& a, const Model& model) {
 }  // namespace
 
 int modes_command(const ModesArguments& a, const CommonOptions& common) {
+  require(a.vtu.empty() || a.vtu.extension() == ".vtu", fmt::format("--vtu: '{}' must end in .vtu", a.vtu.string()));
   const Stopwatch clock;
   std::optional<WorkLine> progress(std::in_place, !common.quiet && !common.json, "modes");
   Model model = load_model(a.model, a.options);

@@ -210,6 +210,7 @@ class BadInput(Case):
         self.assert_refused("run", "sport", "--out", "file/out", words="file/out: Not a directory")
         self.assert_refused("run", "sport", "--out", "file", words="Not a directory")
         self.assert_refused("modes", BOOM4, "--vtu", "file/shapes.vtu", words="file/shapes.vtu")
+        self.assert_refused("modes", BOOM4, "--vtu", "shapes.foo", words="must end in .vtu")
 
     def test_modes_of_something_else(self):
         self.assert_refused("modes", "absent.toml", words="absent.toml")
