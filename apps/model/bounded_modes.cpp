@@ -158,9 +158,10 @@ BoundedModes climb(BoundedModes here, Steps allowed, double fall, const EigenOpt
 
 }  // namespace
 
+bool tapers_steeply(const BeamGeometry& boom) { return std::ranges::any_of(make_mesh(boom).beam_properties, is_steep); }
+
 double slowest_fall(const BodyScene& body) {
-  if (body.structure != "solid")
-    return std::ranges::any_of(make_mesh(body.geometry).beam_properties, is_steep) ? taper_fall : usual_fall;
+  if (body.structure != "solid") return tapers_steeply(body.geometry) ? taper_fall : usual_fall;
   if (body.solid.slit > 0) return singular_fall;
   const bool own = follows_accuracy(body);
   double slowest = 0;

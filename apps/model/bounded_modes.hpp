@@ -34,11 +34,14 @@ struct BoundedModes {
   std::optional<bool> met() const;
 };
 
+/// Does a boom of beams taper to a third of its depth, or less, within one element?
+bool tapers_steeply(const BeamGeometry&);
+
 /// The largest part of a boom's discretisation errors that is left on the next finer mesh. It is 0.5, or 0.7 where
 /// edges along the boom are singular (slits, rectangular tubes). Meshes of the program's choice have 0.25 for round
 /// bars, 0.4 for tubes, 0.35 for rectangles of less than one to four. Meshes of which the file gives sizes have 0.8.
-/// Measured on 25 booms were 0.23, 0.32 and 0.28 at most. Beams that taper to a third or less within one element have
-/// 0.95; measured were 0.91 at most.
+/// Measured on 25 booms were 0.23, 0.32 and 0.28 at most. Beams that taper steeply have 0.95; measured were 0.91 at
+/// most.
 double slowest_fall(const BodyScene&);
 
 /// Modes of a model, each frequency with a bound from a mesh of the same boom that is one step finer (`refined`).
@@ -47,6 +50,9 @@ double slowest_fall(const BodyScene&);
 /// frequency is then at least 1 - f of the coarser mesh's error, and at least (1 - f) / f of the finer one's. A bound
 /// of a solid is never less than a fiftieth of the largest. Where the change is a tenth of the frequency or more, the
 /// coarser mesh resolves neither this mode nor those above it, whose order may change.
+///
+/// What the round-off of K changes (ModalBasis::round_off) is part of a bound. Where that alone is a tenth or more,
+/// neither this mode nor those above it have one.
 ///
 /// A solid boom of which no more than the accuracy is given (SolidOptions) goes on to finer meshes until the accuracy
 /// is met. It takes one step. It then takes a mesh of its own (`tuned`), and three steps from there at most. No mesh
