@@ -188,6 +188,8 @@ std::vector<std::string> coupling_cannot_hold(const ReducedBody& body) {
       sentences.emplace_back("Damping couples the modes: zeta has its diagonal, the entry \"damping\" all of it.");
     }
   }
+  if (body.frame == "free")
+    sentences.emplace_back("The modes hold rigid motions, which the rigid body has as well: clamp the body.");
   sentences.emplace_back("A hinge, its spring and its stop are not held.");
   return sentences;
 }

@@ -239,6 +239,8 @@ TEST(ExportCoupling, FileHoldsFrequenciesDampingAndParticipation) {
   EXPECT_NE(file_bytes(path.parent_path() / "boom.modes.csv").find("\n2,bending_y,"), std::string::npos);
   EXPECT_NE(file_bytes(path.parent_path() / "boom.rigid.csv").find("\nJ_xy,0\n"), std::string::npos);
   EXPECT_EQ(coupling_cannot_hold(bent()).size(), 2U);  // Rayleigh damping is diagonal in the modes
+  body.frame = "free";
+  EXPECT_EQ(coupling_cannot_hold(body).size(), 3U) << "rigid motions are there twice";
 }
 
 TEST(ExportCoupling, FaultsNameTheFile) {
