@@ -1076,6 +1076,17 @@ material = { E = 70e9, nu = 0.3, rho = 2700 }
         self.assertIsNone(document["accuracy_met"])
         self.assertIn("a mesh file has no finer mesh", document["error_bounds_found"])
 
+    def test_a_mesh_file_does_not_say_what_is_held(self):
+        deck = self.folder / "boom.inp"
+        result = flexboom("mesh", BOOM4, "-o", deck, "--structure", "solid", "--element", "hex20")
+        self.assert_exit(OK, result)
+        self.assertIn('"root" is held; its modes take --clamp root', result.stderr)
+        reduce = ("reduce", deck, "-o", self.folder / "body.h5", "--count", "4", "--material", "67e9,0.33,2840")
+        result = flexboom(*reduce)
+        self.assert_exit(INPUT, result)
+        self.assertIn("6 rigid motions of the body are not held", result.stderr)
+        self.assert_exit(OK, flexboom(*reduce, "--clamp", "root"))
+
     def test_formats_hold_the_same_body(self):
         clamp = ["--clamp", "root", "--material", "67e9,0.33,2840"]
         deck = self.mesh(BOOM4, "boom.inp", "--structure", "solid", "--element", "hex20")
