@@ -82,12 +82,11 @@ Finer finer_elements(const Scene& scene) {
   for (const BodyScene& b : scene.bodies) {
     if (has(b, &RicherBodies::finer_elements))
       r.error_per_change = std::max(r.error_per_change, b.richer->error_per_change);
-    if (!b.is_boom()) continue;
-    if (b.structure == "beam" && tapers_steeply(b.geometry))
+    const bool is_solid = b.is_boom() && b.structure == "solid";
+    if (is_solid || (b.is_boom() && b.structure == "beam" && tapers_steeply(b.geometry)))
       r.error_per_change = std::max(r.error_per_change, 1 / (1 - slowest_fall(b)));
-    if (b.structure != "solid") continue;
+    if (!is_solid) continue;
     r.steps = 1;
-    r.error_per_change = std::max(r.error_per_change, 1 / (1 - slowest_fall(b)));
     if (!is_bearable(mesh_of(b, r.steps)))
       throw InputError(fmt::format("the next finer elements of body {} are too many", b.name));
   }
