@@ -26,9 +26,8 @@ BoundedModes modes_of(const std::vector<Piece>& pieces, const std::string& keys,
   std::string text = "format = \"flexboom-body-1\"\nname = \"boom\"\ndirections = \"all\"\n" + keys;
   for (const Piece& p : pieces)
     text += fmt::format(
-        "\n[[segments]]\nshape = \"rectangle\"\nlength = {:.17g}\nheight = {}\nwidth = {}\nend = {{ height = {}, width "
-        "= "
-        "{} }}\nmaterial = {{ E = 70e9, nu = 0.33, rho = 2700 }}",
+        "\n[[segments]]\nshape = \"rectangle\"\nlength = {:.17g}\nheight = {}\nwidth = {}\n"
+        "end = {{ height = {}, width = {} }}\nmaterial = {{ E = 70e9, nu = 0.33, rho = 2700 }}",
         p.length, p.height, p.width, p.end_height, p.end_width);
   const auto file = std::filesystem::temp_directory_path() / fmt::format("flexboom-bounded-{}.toml", ::getpid());
   std::ofstream(file) << text << "\n";
@@ -76,13 +75,12 @@ TEST(BoundedModes, HoldOfSteepTapers) {
       graded.push_back(piece(from, to)), from = to;
     }
     const Eigen::VectorXd exact = modes_of(graded, "order = 11").basis.omega;
-    for (const int elements : {0, 1, 2, 5, 10})
+    for (const int elements : {1, 2, 5, 8, 10})
       for (const int order : {2, 3, 4, 5, 8}) {
-        const std::string keys = fmt::format("order = {}", order);
         std::vector<Piece> pieces;
-        const int n = elements == 0 ? 8 : elements;
-        for (int k = 0; k < n; ++k) pieces.push_back(piece(0.4 * k / n, 0.4 * (k + 1) / n));
-        expect_bounds_hold(modes_of(pieces, keys), exact, fmt::format("{} elements of order {}", n, order));
+        for (int k = 0; k < elements; ++k) pieces.push_back(piece(0.4 * k / elements, 0.4 * (k + 1) / elements));
+        expect_bounds_hold(modes_of(pieces, fmt::format("order = {}", order)), exact,
+                           fmt::format("{} elements of order {}", elements, order));
       }
   }
 }
