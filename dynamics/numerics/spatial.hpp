@@ -104,13 +104,14 @@ Mat3<T> transposed(const Mat3<T>& a) {
 /// Component of a vector, or of a symmetric matrix in the order of its members, by number.
 template <class T, std::integral I>
 T& component(Vec3<T>& a, I i) {
-  T* const entries[] = {&a.x, &a.y, &a.z};
-  return *entries[i];
+  static constexpr T Vec3<T>::*entries[] = {&Vec3<T>::x, &Vec3<T>::y, &Vec3<T>::z};
+  return a.*entries[i];
 }
 template <class T, std::integral I>
 T& component(Sym3<T>& a, I i) {
-  T* const entries[] = {&a.xx, &a.yy, &a.zz, &a.xy, &a.yz, &a.zx};
-  return *entries[i];
+  using S = Sym3<T>;
+  static constexpr T S::*entries[] = {&S::xx, &S::yy, &S::zz, &S::xy, &S::yz, &S::zx};
+  return a.*entries[i];
 }
 
 inline Vec3<double> vec3(const Eigen::Vector3d& a) { return {a.x(), a.y(), a.z()}; }

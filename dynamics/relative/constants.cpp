@@ -52,7 +52,7 @@ void set_shapes(const ReducedBody& b, const std::string& name, const Matrix3d& t
       std::vector<MatrixXd> r(Kg.size(), MatrixXd::Zero(b.n(), b.n()));
       for (size_t i = 0; i < Kg.size(); ++i)
         for (size_t j = 0; j < Kg.size(); ++j) r[i] -= to_link(static_cast<int>(i), static_cast<int>(j)) * Kg[j];
-      return packed_vector_family(r);
+      return equations::Rows<double>(packed_vector_family(r));
     };
     place.S_slope = slope(s.force);
     place.theta_slope = slope(s.torque);

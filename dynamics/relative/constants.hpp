@@ -11,7 +11,6 @@
 
 namespace flexboom::tree {
 
-using equations::Term;
 using spatial::Mat3;
 using spatial::Sym3;
 using spatial::Vec3;
@@ -21,8 +20,8 @@ using spatial::Vec3;
 struct PlaceModel {
   Vec3<double> position;
   Mat3<double> axes;
-  std::vector<Vec3<double>> S, S_theta;    // n; empty: fixed in the body
-  std::vector<Term> S_slope, theta_slope;  // d S_k / d q_l
+  std::vector<Vec3<double>> S, S_theta;          // n; empty: fixed in the body
+  equations::Rows<double> S_slope, theta_slope;  // d S_k / d q_l
 
   bool moves() const { return !S.empty(); }
 };

@@ -72,29 +72,29 @@ void follow_coordinates(const Link& link, const T* q, const T* q_dot, SecondOrde
   }
 }
 
-/// The inverse of a symmetric positive definite matrix, n x n, by sweeps of its diagonal: loops over rows, which fill
-/// registers. `row`: n. Returns the least pivot, which is that of L D L^T, over the element of the diagonal that it
-/// came from.
+/// The inverse of a symmetric positive definite matrix, n x n, by sweeps of its diagonal: loops over whole rows, which
+/// fill registers. `row`: n. Returns the least pivot, which is that of L D L^T, over the element of the diagonal that
+/// it came from.
 template <class T>
 double invert(size_t n, const std::vector<T>& matrix, std::vector<T>& row, std::vector<T>& inverse) {
-  inverse = matrix;  // its lower triangle; all swept, it is minus the inverse
   double least = 1;
+  for (size_t i = 0; i < n * n; ++i) inverse[i] = -matrix[i];  // all swept, it is the inverse
   for (size_t j = 0; j < n; ++j) {
     T* const A_j = inverse.data() + j * n;
-    least = std::min(least, value_of(A_j[j]) / value_of(matrix[j * n + j]));
-    const T of_pivot = T(1.0) / A_j[j];
-    for (size_t k = 0; k < n; ++k) row[k] = k < j ? A_j[k] : inverse[k * n + j];
+    least = std::min(least, value_of(A_j[j]) / -value_of(matrix[j * n + j]));
+    const T of_pivot = T(-1.0) / A_j[j];
+    for (size_t k = 0; k < n; ++k) row[k] = A_j[k];
     for (size_t i = 0; i < n; ++i) {
+      if (i == j) continue;
       T* const A_i = inverse.data() + i * n;
       const T share = row[i] * of_pivot;
-      for (size_t k = 0; k <= i; ++k) A_i[k] -= share * row[k];
-      if (i > j) A_i[j] = share;
+#pragma GCC ivdep
+      for (size_t k = 0; k < n; ++k) A_i[k] += share * row[k];
+      A_i[j] = share;
     }
-    for (size_t k = 0; k < j; ++k) A_j[k] = row[k] * of_pivot;
-    A_j[j] = -of_pivot;
+    for (size_t k = 0; k < n; ++k) A_j[k] = row[k] * of_pivot;
+    A_j[j] = of_pivot;
   }
-  for (size_t i = 0; i < n; ++i)
-    for (size_t k = 0; k <= i; ++k) inverse[k * n + i] = inverse[i * n + k] = -inverse[i * n + k];
   return least;
 }
 
@@ -134,8 +134,10 @@ equations::Inertia<T> second_order_body(const Link& link, const Vec3<T>& w, cons
       s.Ct[k] += slope[k] * Ct;
       modes.Cr[k] += slope[k] * Cr;
       modes.b[k] += slope[k] * force - Me[k] * s.Q_ddot[a];
-      const T whole = Me[k] + m * slope[k];
-      for (size_t l = 0; l <= k; ++l) s.Me[k * n + l] += whole * slope[l] + slope[k] * Me[l];
+      const T whole = Me[k] + m * slope[k], half = slope[k];
+      T* const Me_k = s.Me.data() + k * n;
+#pragma GCC ivdep
+      for (size_t l = 0; l <= k; ++l) Me_k[l] += whole * slope[l] + half * Me[l];
     }
   }
   for (size_t k = 0; k < n; ++k)

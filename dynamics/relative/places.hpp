@@ -121,18 +121,17 @@ void move_place(const PlaceModel& m, const T* q, const T* q_dot, PlaceMotion<T>&
     s.r += q[k] * m.S[k];
     theta += q[k] * m.S_theta[k];
   }
-  for (const Term& t : m.S_slope) {
-    const T v = t.value * q[t.l];
-    component(U[t.k].t, t.component) += v;
-    component(s.r, t.component) += 0.5 * (v * q[t.k]);
-    component(s.r_ddot, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
-  }
-  for (const Term& t : m.theta_slope) {
-    const T v = t.value * q[t.l];
-    component(U[t.k].w, t.component) += v;
-    component(theta, t.component) += 0.5 * (v * q[t.k]);
-    component(bias, t.component) += t.value * (q_dot[t.k] * q_dot[t.l]);
-  }
+  const auto add_slopes = [=](const equations::Rows<double>& slopes, Vec3<T> Twist<T>::*part, Vec3<T>& moved,
+                              Vec3<T>& second) {
+    for (const equations::RowOf& row : slopes.rows) {
+      const T v = slopes.sum(row, q);
+      component(U[row.k].*part, row.component) += v;
+      component(moved, row.component) += 0.5 * (v * q[row.k]);
+      component(second, row.component) += slopes.sum(row, q_dot) * q_dot[row.k];
+    }
+  };
+  add_slopes(m.S_slope, &Twist<T>::t, s.r, s.r_ddot);
+  add_slopes(m.theta_slope, &Twist<T>::w, theta, bias);
   for (size_t k = 0; k < n; ++k) s.r_dot += q_dot[k] * U[k].t, rate += q_dot[k] * U[k].w;
   // Rotation exp(tilde(theta)); its angular velocity J theta_dot, J = 1 + f2 tilde(theta) + f3 tilde(theta)^2.
   const T s2 = dot(theta, theta), s2_dot = 2.0 * dot(theta, rate);
