@@ -1,6 +1,7 @@
 #include "dynamics/model/second_order_shapes.hpp"
 
 #include "fem/base/check.hpp"
+#include "reduction/invariants/geometric_stiffness.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
@@ -67,13 +68,14 @@ std::vector<Vector4d> affine_functions(const Eigen::Matrix4d& gram) {
   return functions;
 }
 
+constexpr std::array<std::array<Index, 2>, 6> spin_products = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}}};
+
 /// Integral of rho (1, u0) u2^T, 4 x 3: its coefficient of q_k q_l.
 Eigen::Matrix<double, 4, 3> second_order_moment(const GeometricStiffness& Kg, Index k, Index l) {
   const auto entry = [k, l](const std::vector<MatrixXd>& v) { return Vector3d(v[0](k, l), v[1](k, l), v[2](k, l)); };
-  constexpr std::array<std::array<Index, 2>, 6> spin = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}}};
   Matrix3d J;  // the inertia of u0 with u2: w^T J w q_k q_l = -(sum w_i w_j Kg.spin)_kl q_k q_l
   for (size_t c = 0; c < 6; ++c) {
-    const auto [i, j] = spin[c];
+    const auto [i, j] = spin_products[c];
     J(i, j) = J(j, i) = (c < 3 ? -1.0 : -0.5) * Kg.spin[c](k, l);
   }
   Eigen::Matrix<double, 4, 3> moment;
@@ -120,6 +122,27 @@ SecondOrderShapes with_second_order_shapes(const ReducedBody& b) {
   r.body = blank_body(b.name, static_cast<int>(n + std::ssize(r.follow)));
   set_invariants(r.body, L * gram * L.transpose());
   return r;
+}
+
+MatrixXd modal_stiffness(const ReducedBody& b, const VectorXd& q_ddot) {
+  const Index n = b.n();
+  if (b.Kg.spin.empty() || n == 0) return MatrixXd::Zero(n, n);
+  Matrix3d J = Matrix3d::Zero();
+  for (Index k = 0; k < n; ++k) J += 0.5 * q_ddot[k] * b.J1[static_cast<size_t>(k)];
+  Eigen::Matrix4d gram;
+  gram << b.m, b.mc0.transpose(), b.mc0, dyads(Vector3d::Zero(), b.J0);
+  Eigen::Matrix<double, 4, 3> moment;  // integral of rho (1, u0) (S q_ddot)^T
+  moment << (b.Ct * q_ddot).transpose(), dyads(b.Cr0 * q_ddot, J);
+  Eigen::Matrix<double, 4, 3> field = Eigen::Matrix<double, 4, 3>::Zero();  // its transpose times (1, u0)
+  for (const Vector4d& p : affine_functions(gram)) field += p * (p.transpose() * moment) / b.m;
+  // c + [alpha]~ u0 + (P - tr P) u0: the last as if of a spin whose products are P.
+  const Matrix3d slope = field.bottomRows<3>().transpose(), even = 0.5 * (slope + slope.transpose());
+  const Matrix3d products = even - 0.5 * even.trace() * Matrix3d::Identity();
+  const Vector3d alpha =
+      0.5 * Vector3d(slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0), slope(1, 0) - slope(0, 1));
+  MatrixXd K = motion_stiffness(b, Vector3d::Zero(), field.row(0).transpose(), alpha);
+  for (size_t c = 0; c < 6; ++c) K += products(spin_products[c][0], spin_products[c][1]) * b.Kg.spin[c];
+  return K;
 }
 
 }  // namespace flexboom

@@ -20,4 +20,9 @@ struct SecondOrderShapes {
 /// @throws InputError when the body has no geometric stiffness.
 SecondOrderShapes with_second_order_shapes(const ReducedBody&);
 
+/// Geometric stiffness (n x n) by accelerations q_ddot of the coordinates: u2 feels the part of S q_ddot that is affine
+/// in the place. Beside `motion_stiffness`: where few things hold the root, its acceleration and those of many modes
+/// nearly cancel. Zero where Kg was not computed.
+Eigen::MatrixXd modal_stiffness(const ReducedBody&, const Eigen::VectorXd& q_ddot);
+
 }  // namespace flexboom

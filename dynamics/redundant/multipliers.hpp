@@ -28,6 +28,7 @@ struct BodyState {
 struct BodyAcceleration {
   Eigen::Vector3d of_origin = Eigen::Vector3d::Zero();  // of R, inertial axes [m/s^2]
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();    // BRF axes [rad/s^2]
+  Eigen::VectorXd of_q{};                               // q_ddot
 };
 
 /// What a joint's constraints do to b, at the place b, in the axes of place a; a gets the opposite. The mechanism's own

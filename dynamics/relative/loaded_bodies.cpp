@@ -1,6 +1,7 @@
 #include "dynamics/relative/loaded_bodies.hpp"
 
 #include "dynamics/model/load_values.hpp"
+#include "dynamics/model/second_order_shapes.hpp"
 #include "reduction/invariants/geometric_stiffness.hpp"
 
 #include <algorithm>
@@ -17,8 +18,9 @@ LoadedBodies::LoadedBodies(const Multibody& scene, Where where) : scene_(scene),
 }
 
 void LoadedBodies::move(size_t body, const Vector3d& omega, const Vector3d& acceleration,
-                        const Vector3d& angular_acceleration) {
-  K_[body] += motion_stiffness(scene_.bodies[body], omega, acceleration, angular_acceleration);
+                        const Vector3d& angular_acceleration, const Eigen::VectorXd& q_ddot) {
+  K_[body] += motion_stiffness(scene_.bodies[body], omega, acceleration, angular_acceleration) +
+              modal_stiffness(scene_.bodies[body], q_ddot);
 }
 
 bool LoadedBodies::counts(const Place& at) const {

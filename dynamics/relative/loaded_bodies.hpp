@@ -19,9 +19,9 @@ class LoadedBodies {
   LoadedBodies(const Multibody&, Where where);
 
   /// Motion of the BRF of a body, BRF axes: angular velocity [rad/s], acceleration of the origin less gravity [m/s^2],
-  /// angular acceleration [rad/s^2].
+  /// angular acceleration [rad/s^2]. And the accelerations of its coordinates.
   void move(size_t body, const Eigen::Vector3d& omega, const Eigen::Vector3d& acceleration,
-            const Eigen::Vector3d& angular_acceleration);
+            const Eigen::Vector3d& angular_acceleration, const Eigen::VectorXd& q_ddot);
   /// One load per joint.
   void push_by_joints(const std::vector<JointLoad>&);
   void push_by_loads(double t);

@@ -141,7 +141,7 @@ std::vector<StiffeningEffect> stiffening_effect(const Multipliers& system, doubl
   for (size_t i = 0; i < s.bodies.size(); ++i) {
     const Matrix3d to_body = rotation_matrix(s.bodies[i].attitude).transpose();
     bodies.move(i, s.bodies[i].omega, to_body * (s.accelerations[i].of_origin - p.scene.gravity),
-                s.accelerations[i].angular);
+                s.accelerations[i].angular, s.accelerations[i].of_q);
   }
   bodies.push_by_joints(joint_loads(system, s));
   bodies.push_by_loads(t);

@@ -397,7 +397,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     MultibodyState s;
     s.bodies = equations_.unpack(y.data());
     for (const BodyPlaces& at : equations_.places())
-      s.accelerations.push_back({y_dot.segment<3>(at.v), y_dot.segment<3>(at.w)});
+      s.accelerations.push_back({y_dot.segment<3>(at.v), y_dot.segment<3>(at.w), y_dot.segment(at.u, at.n)});
     for (size_t i = 0; i < scene_.joints.size(); ++i) {
       const JointKind kind = scene_.joints[i].kind;
       Gap c;

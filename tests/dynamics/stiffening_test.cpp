@@ -302,10 +302,14 @@ TEST(Stiffening, IsThatOfTheMotionAndTheLoads) {
     K += M[static_cast<int>(i)] * b.Kg.markers[0].torque[i];
   }
   const SecondOrderShapes shapes = with_second_order_shapes(b);
+  MatrixXd of_modes = MatrixXd::Zero(3, 3);
   for (size_t k = 0; k < shapes.follow.size(); ++k) {
     const VectorXd E = shapes.body.Me.row(3 + static_cast<Index>(k)).head<3>();  // int rho S . (shape k)
-    K += E.dot(q_ddot) * shapes.follow[k] + E * (shapes.follow[k] * q_ddot).transpose();
+    of_modes += E.dot(q_ddot) * shapes.follow[k];
+    K += E * (shapes.follow[k] * q_ddot).transpose();
   }
+  EXPECT_LT((modal_stiffness(b, q_ddot) - of_modes).norm(), 1e-12 * of_modes.norm());  // round-off
+  K += of_modes;
   const MatrixXd found = -b.Me * (slope[1] - slope[0]);
   EXPECT_LT((found - K).norm(), 1e-12 * K.norm());  // round-off
 }
