@@ -307,8 +307,9 @@ void body_keys(Archive& a, BodyScene& b) {
   if (a.use() == Use::document)
     a.key({"file", "", "body file with the geometry; the keys down to `damping` may stand beside it"}, file);
   if (a.use() == Use::read || a.use() == Use::document || !b.stiffening.empty())
-    a.choice({"stiffening", "", "geometric stiffness, by itself where it would change more than the tolerance", false,
-              "`\"auto\"`"},
+    a.choice({"stiffening", "",
+              "geometric stiffness, by itself where it would change more than the tolerance or both ends are held",
+              false, "`\"auto\"`"},
              stiffenings, b.stiffening);
   model_keys(a, b);
   if (reader && !b.modes_given && b.structure != "rigid") b.modes_auto = true;

@@ -18,6 +18,7 @@
 namespace flexboom {
 
 using Eigen::Index;
+using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
@@ -122,6 +123,43 @@ std::vector<std::string> warnings_of(const Scene& scene, const Multibody& bodies
   return warnings;
 }
 
+/// Where closing the loops bent a body. A displacement below the tolerance of the body's size is none.
+void note_bent_starts(const Scene& scene, const Multibody& bodies, const TreeState& asked, const TreeState& first,
+                      std::vector<std::string>& notes) {
+  for (size_t b = 0; b < bodies.bodies.size(); ++b) {
+    const ReducedBody& body = bodies.bodies[b];
+    const auto moved = [&](const Marker& m) { return (m.S * (first.q[b] - asked.q[b])).norm(); };
+    const auto most = std::ranges::max_element(body.markers, {}, moved);
+    if (most != body.markers.end() && moved(*most) > scene.tolerance * std::sqrt(body.J0.trace() / body.m))
+      notes.push_back(fmt::format("body {}: starts bent, its \"{}\" by {:.3g} m, so that the loops close", body.name,
+                                  most->name, moved(*most)));
+  }
+}
+
+/// Where closing the loops turned or moved what a joint without coordinates of its own carries.
+void note_moved_start(const Scene& scene, const JointScene& joint, const JointState& asked, const JointState& first,
+                      std::vector<std::string>& notes) {
+  const auto note = [&](const std::string& what) {
+    notes.push_back(fmt::format("joint {}: starts {}, so that the loops close", joint.name, what));
+  };
+  const double cosine = std::min(1.0, std::abs(asked.attitude.normalized().dot(first.attitude.normalized())));
+  if (const double turn = 2 * std::acos(cosine); turn > scene.tolerance)
+    note(fmt::format("turned by {:.3g} rad", turn));
+  if (const double way = (first.position - asked.position).norm(); way > scene.tolerance)
+    note(fmt::format("{:.3g} m away from where it was asked", way));
+  const double turn_rate = std::max(asked.omega.norm(), first.omega.norm());
+  const auto changed = [&](const Vector3d& a, const Vector3d& b) {  // a velocity against that of a turn a metre away
+    return (a - b).norm() > scene.tolerance * std::max({a.norm(), b.norm(), turn_rate});
+  };
+  if (changed(asked.omega, first.omega))
+    note(fmt::format("with ({:.6g}, {:.6g}, {:.6g}) rad/s, not ({:.6g}, {:.6g}, {:.6g})", first.omega.x(),
+                     first.omega.y(), first.omega.z(), asked.omega.x(), asked.omega.y(), asked.omega.z()));
+  if (changed(asked.velocity, first.velocity))
+    note(fmt::format("with ({:.6g}, {:.6g}, {:.6g}) m/s, not ({:.6g}, {:.6g}, {:.6g})", first.velocity.x(),
+                     first.velocity.y(), first.velocity.z(), asked.velocity.x(), asked.velocity.y(),
+                     asked.velocity.z()));
+}
+
 /// Where closing the loops moved a joint away from the start or the rate it was given.
 void note_moved_starts(const Scene& scene, const TreeState& asked, const TreeState& first,
                        std::vector<std::string>& notes) {
@@ -134,6 +172,8 @@ void note_moved_starts(const Scene& scene, const TreeState& asked, const TreeSta
     if (j.closes_loop) continue;
     const JointState& wanted = asked.joints[of_tree++];
     const JointState& closed = first.joints[i];
+    const JointType& type = joint_type(j.kind);
+    if (type.turns || type.floats) note_moved_start(scene, j, wanted, closed, notes);
     const auto moved = [&](double a, double b, double size) { return std::abs(a - b) > scene.tolerance * size; };
     for (size_t k = 0; k < wanted.coordinate.size(); ++k)
       if (moved(closed.coordinate[k], wanted.coordinate[k], 1))
@@ -212,7 +252,7 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
   Multibody all = make_multibody(scene, bodies);
   const Scene open = without_loops(scene);
   const Multibody opened = make_multibody(open, bodies);
-  std::vector<Stiffening> stiffening = first_stiffening(open, Tree(opened));
+  std::vector<Stiffening> stiffening = first_stiffening(open, all, Tree(opened));
   Run r;
   r.bodies = std::move(bodies);
   IntegratorOptions options = integrator_options(scene, hooks, "ida", max_steps);
@@ -262,6 +302,7 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
   add_states(*system, flight, states);
   set_flown({scene, *system, *r.tree, flight, states}, 0, states.size(), stiffening, r);
   note_moved_starts(scene, asked, states.front(), r.notes);
+  note_bent_starts(scene, system->multibody(), asked, states.front(), r.notes);
   r.integrate_seconds = flight_time.seconds();
   return r;
 }

@@ -281,6 +281,31 @@ namespace {
 
 bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty(); }
 
+/// Per body: does it lie between the two ends of a spring or of a joint that closes a loop? Such an end holds the body
+/// from getting shorter where it bends. So no load tells of its geometric stiffness before that is in the equations.
+std::vector<char> held_at_both_ends(const Multibody& bodies) {
+  std::vector<int> parent(bodies.bodies.size(), -1);
+  for (const Joint& j : bodies.joints)
+    if (!j.closes_loop) parent[static_cast<size_t>(j.b.body)] = j.a.body;
+  std::vector<char> held(bodies.bodies.size(), 0);
+  const auto hold_between = [&](int a, int b) {
+    std::vector<int> above;  // a and what carries it
+    for (; a >= 0; a = parent[static_cast<size_t>(a)]) above.push_back(a);
+    for (; b >= 0; b = parent[static_cast<size_t>(b)]) {
+      held[static_cast<size_t>(b)] = 1;
+      const auto common = std::ranges::find(above, b);
+      if (common == above.end()) continue;
+      above.erase(common, above.end());
+      break;
+    }
+    for (const int body : above) held[static_cast<size_t>(body)] = 1;
+  };
+  for (const Joint& j : bodies.joints)
+    if (j.closes_loop) hold_between(j.a.body, j.b.body);
+  for (const SpringDamper& s : bodies.springs) hold_between(s.a.body, s.b.body);
+  return held;
+}
+
 EnergyOfRun ledger_of(const Balance& b) { return {b.kinetic, b.potential, b.work, b.ledger}; }
 
 /// What results are made of.
@@ -292,13 +317,15 @@ void set_flown(const Scene& scene, TreeTrajectory flight, Run& r) {
 
 }  // namespace
 
-std::vector<Stiffening> first_stiffening(const Scene& scene, const Tree& plain) {
+std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& whole, const Tree& plain) {
   const Multibody& bodies = plain.scene();
   std::vector<Stiffening> none(bodies.bodies.size(), Stiffening::off);
   if (std::ranges::none_of(bodies.bodies, has_stiffening)) return none;
   std::vector<Stiffening> choice =
       stiffening_where_it_counts(plain, first_state(scene, plain), scene.duration, scene.tolerance);
+  const std::vector<char> held = held_at_both_ends(whole);
   for (size_t i = 0; i < choice.size(); ++i) {
+    if (held[i]) choice[i] = Stiffening::on;
     if (scene.bodies[i].stiffening == "on" && bodies.bodies[i].n() > 0) choice[i] = Stiffening::on;
     if (scene.bodies[i].stiffening == "off" || !has_stiffening(bodies.bodies[i])) choice[i] = Stiffening::off;
   }
@@ -357,7 +384,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   const Stopwatch start;
   const Multibody multibody = make_multibody(scene, bodies);
   const auto plain = std::make_shared<const Tree>(multibody);
-  std::vector<Stiffening> stiffening = first_stiffening(scene, *plain);
+  std::vector<Stiffening> stiffening = first_stiffening(scene, multibody, *plain);
   Run r;
   r.bodies = std::move(bodies);
   r.prepare_seconds = start.seconds();

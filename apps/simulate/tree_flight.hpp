@@ -26,9 +26,10 @@ std::vector<std::string> joint_names(const Scene&);
 /// Where a flight of a scene with joints is.
 FlightState end_of(const Run&, const Scene&, double time, const Eigen::VectorXd& y, const IntegrationSummary&);
 
-/// Geometric stiffness of each body: as the scene says, "auto" by what its start and prescribed motions make of it.
-/// `plain`: the tree without any.
-std::vector<Stiffening> first_stiffening(const Scene&, const Tree& plain);
+/// Geometric stiffness of each body: as the scene says, "auto" by what its start and prescribed motions make of it, and
+/// on where springs or joints that close loops hold it at both ends. `whole`: with these joints; `plain`: the tree
+/// without any geometric stiffness.
+std::vector<Stiffening> first_stiffening(const Scene&, const Multibody& whole, const Tree& plain);
 
 /// Turns on what a flight showed to count: `effect` per body. Was there any?
 bool revise_stiffening(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect,

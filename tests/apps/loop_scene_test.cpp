@@ -99,6 +99,98 @@ TEST(LoopScene, FourBarFliesAndNamesItsRedundantRows) {
   }
 }
 
+/// A tube clamped at its root. Its tip slides across, on a rail in the inertial frame.
+constexpr const char* guided = R"toml(
+format = "flexboom-scene-1"
+name = "guided"
+duration = 0.3
+output_step = 0.005
+accuracy = { tolerance = 1e-4, budget = false }
+integrator = { formulation = "multipliers" }
+[[bodies]]
+name = "tube"
+modes = 2
+corrections = ["tip.Fx", "tip.Fy", "tip.Mz"]
+damping = { rule = "modal", value = 0.1 }
+[[bodies.segments]]
+shape = "tube"
+diameter = 0.02
+thickness = 0.001
+length = 2.0
+material = { E = 70e9, nu = 0.33, rho = 2700 }
+[[joints]]
+name = "wall"
+kind = "fixed"
+loads = true
+b = { body = "tube", marker = "root" }
+[[joints]]
+name = "rail"
+kind = "slider"
+a = { point = [2.0, 0.0, 0.0], x = [1.0, 0.0, 0.0], z = [0.0, 1.0, 0.0] }
+b = { body = "tube", marker = "tip", x = [1.0, 0.0, 0.0], z = [0.0, 1.0, 0.0] }
+closes_loop = true
+[[loads]]
+name = "push"
+at = { body = "tube", marker = "tip" }
+axes = "inertial"
+force = ["0", "6*sin(6*t)", "0"]
+)toml";
+
+// Bent, the tube would get shorter by 0.6 w^2 / L, and the rail does not let it. Nothing but that pulls it.
+TEST(LoopScene, WhatALoopKeepsFromGettingShorterIsPulled) {
+  const RunResult r = run(guided);
+  const VectorXd w = column(r, "tube.tip.y"), pull = column(r, "wall.force.x");
+  Index at = 0;
+  const double most = w.cwiseAbs().maxCoeff(&at);
+  const double EA = 70e9 * std::numbers::pi * 0.019 * 0.001;
+  EXPECT_GT(most, 0.01);
+  EXPECT_NEAR(std::abs(pull[at]) / (EA * 0.6 * most * most / 4), 1, 0.1);  // the shape is that of a static bend nearly
+}
+
+// Two tubes at right angles, a stiff spring between their tips: no joint closes a loop, and yet the one pulls the
+// other.
+TEST(LoopScene, SpringsBetweenTipsHoldBodiesAtBothEnds) {
+  const std::string across = R"toml(
+[[bodies]]
+name = "mast"
+modes = 2
+corrections = ["tip.Fx", "tip.Fy"]
+damping = { rule = "modal", value = 0.1 }
+[[bodies.segments]]
+shape = "tube"
+diameter = 0.02
+thickness = 0.001
+length = 2.0
+material = { E = 70e9, nu = 0.33, rho = 2700 }
+[[joints]]
+name = "ground"
+kind = "fixed"
+a = { point = [2.0, -2.0, 0.0], x = [0.0, 1.0, 0.0] }
+b = { body = "mast", marker = "root" }
+[[springs]]
+name = "tie"
+a = { body = "tube", marker = "tip" }
+b = { body = "mast", marker = "tip" }
+free_length = 0.0
+stiffness = 1e5
+)toml";
+  std::string text = with(guided, "integrator = { formulation = \"multipliers\" }\n", "");
+  text = text.substr(0, text.find("[[joints]]\nname = \"rail\"")) + text.substr(text.find("[[loads]]")) + across;
+  const RunResult r = run(text);
+  for (const char* body : {"tube", "mast"})
+    EXPECT_TRUE(std::ranges::any_of(r.plan, [&](const std::string& line) {
+      return line.starts_with(std::string(body) + ": geometric stiffness on (stiffening = \"auto\")");
+    })) << body;
+}
+
+// A closed loop with beams that can bend: what the start does not close, their bending does.
+TEST(LoopScene, StartsThatBendABodyAreTold) {
+  const RunResult r = run(with(guided, "point = [2.0, 0.0, 0.0]", "point = [1.999, 0.0, 0.0]"));
+  EXPECT_TRUE(std::ranges::any_of(r.plan, [](const std::string& line) {
+    return line.starts_with("body tube: starts bent, its \"tip\" by 0.001 m, so that the loops close");
+  }));
+}
+
 // The angle of the hinge that closes the loop is no state of the tree: the file says which turn it is in.
 TEST(LoopScene, FourBarIsTheSameRunInTwoFlights) {
   const std::string sprung = with(four_bar, "closes_loop = true", "closes_loop = true\nstiffness = 2");
