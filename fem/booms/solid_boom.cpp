@@ -266,9 +266,11 @@ int add_reference(Mesh& mesh, const std::vector<double>& shares, double x, doubl
     mesh.rigid_connections.push_back({reference, std::move(section), all_components});
     return reference;
   }
-  std::vector<double> weights;
-  weights.reserve(section.size());
-  for (const int i : section) weights.push_back(x > 0 ? shares[static_cast<size_t>(i)] : 1);  // the root is clamped
+  // The root is clamped. At a step, corners of cells that meet at almost half a turn have no share, or less than none.
+  const auto share = [&](int i) { return x > 0 ? shares[static_cast<size_t>(i)] : 1; };
+  std::erase_if(section, [&](int i) { return !(share(i) > 0); });
+  std::vector<double> weights(section.size());
+  std::ranges::transform(section, weights.begin(), share);
   mesh.distributing_connections.push_back({reference, std::move(section), std::move(weights), all_components});
   return reference;
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 #include <type_traits>
+#include <utility>
 
 namespace flexboom {
 namespace {
@@ -170,6 +171,10 @@ Section section(const GeneralSection& s, double, const ShearRule&) {
   require_positive(s.J, "general section: J [m^4]");
   require_positive(s.kappa_y, "general section: kappa_y");
   require_positive(s.kappa_z, "general section: kappa_z");
+  constexpr double thinnest = 1e-20;  // a strip a million times as wide as thick has 1e-7
+  for (const auto& [I, name] : {std::pair{s.Iy, "Iy"}, std::pair{s.Iz, "Iz"}, std::pair{s.J, "J"}})
+    require(I >= thinnest * square(s.A),
+            fmt::format("general section: {} is {} m^4, and no section of {} m^2 has so little", name, I, s.A));
   return s;
 }
 
@@ -195,8 +200,13 @@ SectionShape between(const GeneralSection& a, const GeneralSection& b, double s)
 }  // namespace
 
 void Material::validate() const {
+  validate_of_beam();
+  require(nu < 0.5, fmt::format("material: nu is {}; it must lie between -1 and 0.5", nu));
+}
+
+void Material::validate_of_beam() const {
   require_positive(E, "material: E [Pa]");
-  require(nu > -1 && nu < 0.5, fmt::format("material: nu is {}; it must lie between -1 and 0.5", nu));
+  require(nu > -1 && std::isfinite(nu), fmt::format("material: nu is {}; it must lie between -1 and 0.5", nu));
   require(std::isfinite(rho) && rho >= 0, fmt::format("material: rho is {} kg/m^3; it must be zero or positive", rho));
 }
 

@@ -8,13 +8,15 @@ namespace flexboom {
 /// Isotropic elastic material.
 struct Material {
   double E = 0;    // Young's modulus [Pa]
-  double nu = 0;   // Poisson's ratio [-]
+  double nu = 0;   // Poisson's ratio [-]; of a beam E / (2 G) - 1, which may be any its fibres give
   double rho = 0;  // density [kg/m^3]
 
   double shear_modulus() const { return E / (2 * (1 + nu)); }
 
   /// @throws InputError unless E > 0, -1 < nu < 0.5, rho >= 0, all finite.
   void validate() const;
+  /// @throws InputError unless the same holds but nu < 0.5: of a beam with its own G.
+  void validate_of_beam() const;
 };
 
 /// Cross-section constants about the centroid, in principal axes y, z of the beam [m^2, m^4, -].

@@ -246,7 +246,7 @@ TEST(WriteAbaqus, WhatADeckCannotHoldIsAnInputError) {
                   [](Mesh& m) {
                     m.distributing_connections.push_back({1, {2}, {1.0}});
                   }),
-            "a distributing connection is not written to decks");
+            "a deck of ours cannot hold a distributing connection; no format does");
   EXPECT_EQ(fault(tet,
                   [](Mesh& m) {
                     m.rigid_connections.push_back({1, {2}, {true, false, true}});

@@ -287,6 +287,21 @@ TEST(Nastran, MaterialFromAnyTwoModuli) {
   EXPECT_NEAR(material("2.6+9,,.3").E, 2.6e9, 1e-3);
 }
 
+// Fibres along a bar: its G is not E / (2 (1 + nu)) of any isotropic material. NU does not enter the stiffness of bars.
+TEST(Nastran, BarsHaveTheirOwnShearModulus) {
+  for (const char* moduli : {"120.+9,5.+9,.3", "120.+9,5.+9,"}) {
+    std::string text = mast + "CBAR,1,1,1,2,1.,0.,0.\nPBAR,1,3,1.-4,1.-8,2.-8,3.-8\n";
+    text.replace(text.find("2.1+11,,.3"), std::string("2.1+11,,.3").size(), moduli);
+    const Material material = read(text).mesh.beam_properties[0].material;
+    EXPECT_NEAR(material.shear_modulus(), 5e9, 1e-3) << moduli;
+    EXPECT_EQ(material.E, 120e9);
+  }
+  std::string solid = small;
+  solid.replace(solid.find("MAT1 "), std::string::npos, "MAT1,3,120.+9,5.+9,,6000.\n");
+  EXPECT_NE(input_error([&] { read(solid); }).find("Poisson's ratio of material 3 is 11; of a solid"),
+            std::string::npos);
+}
+
 TEST(Nastran, NamesOfHyperMeshAndIncludes) {
   const Mesh mesh = read("$HMNAME PROP                   7\"wing box\" 5\n" + small).mesh;
   EXPECT_EQ(mesh.solid_properties[0].name, "wing box");

@@ -111,6 +111,11 @@ TEST(Section, InterpolationIsLinearInDimensions) {
   EXPECT_EQ(std::get<GeneralSection>(interpolate(GeneralSection{1, 1, 1, 1}, GeneralSection{3, 1, 1, 1}, 0.5)).A, 2);
 }
 
+TEST(Section, NoneIsThinnerThanAnyStrip) {
+  EXPECT_THROW(section_of(GeneralSection{1e-4, 1e-320, 1e-9, 1e-9}, 0.3, {"value", 1}), InputError);
+  EXPECT_NO_THROW(section_of(GeneralSection{1e-4, 1e-16, 1e-9, 1e-16}, 0.3, {"value", 1}));
+}
+
 TEST(Section, BadInputSaysWhatIsWrong) {
   const auto message = [](const SectionShape& shape, const ShearRule& rule = {}) {
     return input_error([&] { section_of(shape, 0.3, rule); });

@@ -214,9 +214,6 @@ void read_beam_general_section(Deck& deck, const Keyword& keyword) {
   const double G = deck.real_or_zero(moduli, 1, "shear modulus");
   if (material.E <= 0 || G <= 0) deck.fail(moduli[0], "Young's modulus and the shear modulus must be positive");
   material.nu = material.E / (2 * G) - 1;
-  if (material.nu <= -1 || material.nu >= 0.5)
-    deck.fail(moduli[0],
-              fmt::format("E and G give a Poisson's ratio of {}; it must lie between -1 and 0.5", material.nu));
   if (const auto rho = keyword.find("DENSITY")) material.rho = deck.real(*rho, "DENSITY");
   if (material.rho < 0) deck.fail(keyword.at, "the density must not be negative");
   deck.notes.add("*BEAM GENERAL SECTION: the shear coefficients are taken to be 1");

@@ -82,7 +82,8 @@ class DeckWriter {
     write_sets();
     write_materials();
     for (size_t i = 0; i < mesh_.rigid_connections.size(); ++i) write_rigid(i);
-    require(mesh_.distributing_connections.empty(), "a distributing connection is not written to decks");
+    require(mesh_.distributing_connections.empty(),
+            "a deck of ours cannot hold a distributing connection; no format does");
     write_equations();
     write_supports();
     if (modes) put("*STEP\n*FREQUENCY\n{}\n*END STEP\n", *modes);
@@ -149,8 +150,10 @@ std::string_view DeckWriter::deck_row(size_t e) const {
   const bool is_connected = !mesh_.rigid_connections.empty() || !mesh_.equations.empty();  // only decks hold that
   require(found != deck_rows.end(),
           fmt::format("{} of order {} has no type in CalculiX; {}", name_of(e), element.order,
-                      is_connected ? "take elements that have one (hex20, tet10): other formats hold no connections"
-                                   : "write .vtu or .msh"));
+                      !is_connected ? "write .vtu or .msh"
+                      : type_of(element).shape == Shape::line
+                          ? "other formats hold no connections: none holds this mesh"
+                          : "take elements that have one (hex20, tet10): other formats hold no connections"));
   return found->deck;
 }
 
@@ -217,6 +220,8 @@ void DeckWriter::write_sets() {
 
 void DeckWriter::write_material(const std::string& name, const Material& material) {
   require(material.E != 0, fmt::format("material {} is missing; give E, nu and rho (--material E,nu,rho)", name));
+  require(material.nu < 0.5,
+          fmt::format("a deck gives G by E and nu, and this beam's G makes nu {}; write .vtu", material.nu));
   put("*MATERIAL, NAME={}\n*ELASTIC\n{:.12e}, {:.12e}\n*DENSITY\n{:.12e}\n", name, material.E, material.nu,
       material.rho);
 }

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
+#include <string_view>
 #include <utility>
 
 namespace flexboom {
@@ -21,17 +22,21 @@ using Groups = std::vector<int>;  // tags of physical groups, ascending
 auto text_end_of(std::string& text) { return std::back_inserter(text); }
 
 void require_gmsh_holds(const Mesh& mesh) {
-  const auto lacks = [&mesh](const char* what, int node) {
-    throw InputError(
-        fmt::format("a .msh file cannot hold {} (node {}); write .vtu or .inp", what, mesh.node_label(node)));
+  const auto lacks = [&mesh](const char* what, int node, const char* where) {
+    throw InputError(fmt::format("a .msh file cannot hold {} (node {}); {}", what, mesh.node_label(node), where));
   };
-  if (!mesh.bodies.empty()) lacks("a body", mesh.bodies.front().node);
-  if (!mesh.supports.empty()) lacks("a support", mesh.supports.front().node);
-  if (!mesh.rigid_connections.empty()) lacks("a rigid connection", mesh.rigid_connections.front().reference);
+  if (!mesh.bodies.empty()) lacks("a body", mesh.bodies.front().node, "write .vtu or .inp");
+  if (!mesh.supports.empty()) lacks("a support", mesh.supports.front().node, "write .vtu or .inp");
+  if (!mesh.rigid_connections.empty())
+    lacks("a rigid connection", mesh.rigid_connections.front().reference, "write .inp");
   if (!mesh.distributing_connections.empty())
-    lacks("a distributing connection", mesh.distributing_connections.front().reference);
+    lacks("a distributing connection", mesh.distributing_connections.front().reference, "no format does");
   if (!mesh.equations.empty() && !mesh.equations.front().terms.empty())
-    lacks("an equation", mesh.equations.front().terms.front().node);
+    lacks("an equation", mesh.equations.front().terms.front().node, "write .inp");
+  for (size_t e = 0; e < mesh.elements.size(); ++e)
+    require(!std::string_view(type_of(mesh.elements[e]).name).ends_with("-reduced"),
+            fmt::format("a .msh file cannot say that {} element {} has reduced integration; write .vtu or .inp",
+                        type_of(mesh.elements[e]).name, mesh.element_label(static_cast<int>(e))));
 }
 
 /// Elements of one dimension, kind and groups, which make an entity of Gmsh.

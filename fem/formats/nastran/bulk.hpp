@@ -55,8 +55,8 @@ struct BeamPropertyLine {
 };
 
 struct MaterialLine {
-  Material material;
-  std::string refusal;  // why it cannot be used, empty if it can
+  Material of_solids, of_bars;  // by E and NU; by E and G
+  std::string refusal;          // why it cannot be used, empty if it can
   std::string_view at;
 };
 

@@ -66,12 +66,12 @@ class Systems {
   std::map<long, Placed> placed_;
 };
 
-const Material& material_of(const Bulk& bulk, long id, std::string_view at) {
+const Material& material_of(const Bulk& bulk, long id, std::string_view at, Material MaterialLine::*use) {
   if (bulk.material) return *bulk.material;
   const auto found = bulk.materials.find(id);
   if (found == bulk.materials.end()) bulk.fail(at, fmt::format("material {} is not defined", id));
   if (!found->second.refusal.empty()) bulk.fail(found->second.at, found->second.refusal);
-  return found->second.material;
+  return found->second.*use;
 }
 
 DeckNodes place_nodes(const Bulk& bulk) {
@@ -126,7 +126,11 @@ int Elements::solid_property(const SolidLine& line) {
   if (lines == bulk_.solid_properties.end())
     bulk_.fail(line.at, fmt::format("element {}: PSOLID {} is not defined", line.label, line.property));
   SolidProperty property{name_of("PSOLID", line.property),
-                         material_of(bulk_, lines->second.material, lines->second.at)};
+                         material_of(bulk_, lines->second.material, lines->second.at, &MaterialLine::of_solids)};
+  if (property.material.nu >= 0.5)
+    bulk_.fail(lines->second.at, fmt::format("{}: Poisson's ratio of material {} is {}; of a solid it must lie between "
+                                             "-1 and 0.5",
+                                             property.name, lines->second.material, property.material.nu));
   property.material.rho *= bulk_.mass_factor;
   mesh_.solid_properties.push_back(property);
   sets_[line.property] = &mesh_.element_sets[property.name];
@@ -157,7 +161,7 @@ int Elements::beam_property(const BeamLine& line, const BeamPropertyLine& lines,
   if (!is_new) return place->second;
   BeamProperty property;
   property.start = property.end = lines.shape;
-  property.material = material_of(bulk_, lines.material, lines.at);
+  property.material = material_of(bulk_, lines.material, lines.at, &MaterialLine::of_bars);
   property.theory = lines.shear ? BeamTheory::timoshenko : BeamTheory::euler_bernoulli;
   property.y_axis = y;
   if (lines.line_mass != 0) {

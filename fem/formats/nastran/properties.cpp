@@ -162,24 +162,28 @@ void read_mat1(Bulk& bulk, const Card& card) {
   const auto E = read(1, "E"), G = read(2, "G"), nu = read(3, "NU");
   if (E.has_value() + G.has_value() + nu.has_value() < 2)
     bulk.fail(card.at, fmt::format("MAT1 {}: two of E, G and NU are needed", card.field(0)));
+  if (G && !(*G > 0)) bulk.fail(card.field(2), "MAT1: G must be positive");
   Material m;
   m.E = E ? *E : 2 * (1 + *nu) * *G;
-  if (!nu && *G == 0) bulk.fail(card.field(2), "MAT1: G must be positive");
   m.nu = nu ? *nu : *E / (2 * *G) - 1;
   m.rho = bulk.cards.real_or(card, 4, 0, "RHO");
   if (m.E <= 0) bulk.fail(card.at, fmt::format("MAT1 {}: E must be positive", card.field(0)));
-  if (m.nu <= -1 || m.nu >= 0.5)
-    bulk.fail(card.at,
-              fmt::format("MAT1 {}: Poisson's ratio is {}; it must lie between -1 and 0.5", card.field(0), m.nu));
+  if (nu && (*nu <= -1 || *nu >= 0.5))
+    bulk.fail(card.field(3),
+              fmt::format("MAT1 {}: Poisson's ratio is {}; it must lie between -1 and 0.5", card.field(0), *nu));
   if (m.rho < 0) bulk.fail(card.field(4), "MAT1: RHO must not be negative");
+  Material of_bars = m;
+  if (E && G) of_bars.nu = *E / (2 * *G) - 1;
   if (E && G && nu && std::abs(1 - *E / (2 * (1 + *nu) * *G)) > consistent)
-    bulk.notes.add(fmt::format("MAT1 {}: E, G and NU disagree; E and NU are used", card.field(0)));
-  if (!bulk.materials.try_emplace(bulk.cards.id(card, 0, "material id"), MaterialLine{m, {}, card.at}).second)
+    bulk.notes.add(
+        fmt::format("MAT1 {}: E, G and NU disagree; bars have E and G, solids E and NU, as in Nastran", card.field(0)));
+  if (!bulk.materials.try_emplace(bulk.cards.id(card, 0, "material id"), MaterialLine{m, of_bars, {}, card.at}).second)
     bulk.fail(card.at, fmt::format("material {} is defined twice", card.field(0)));
 }
 
 void read_other_material(Bulk& bulk, const Card& card) {
-  const MaterialLine line{{}, fmt::format("{}: only isotropic materials (MAT1) are understood", card.name), card.at};
+  const MaterialLine line{
+      {}, {}, fmt::format("{}: only isotropic materials (MAT1) are understood", card.name), card.at};
   bulk.materials.try_emplace(bulk.cards.id(card, 0, "material id"), line);
 }
 

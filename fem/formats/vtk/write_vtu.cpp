@@ -20,12 +20,12 @@ using Eigen::Vector3d;
 bool is_beam(const Element& element) { return type_of(element).shape == Shape::line; }
 
 void require_vtu_holds(const Mesh& mesh) {
-  const auto lacks = [&mesh](const char* what, int node) {
-    throw InputError(fmt::format("a .vtu file cannot hold {} (node {}); write .inp", what, mesh.node_label(node)));
+  const auto lacks = [&mesh](const char* what, int node, const char* where = "write .inp") {
+    throw InputError(fmt::format("a .vtu file cannot hold {} (node {}); {}", what, mesh.node_label(node), where));
   };
   if (!mesh.rigid_connections.empty()) lacks("a rigid connection", mesh.rigid_connections.front().reference);
   if (!mesh.distributing_connections.empty())
-    lacks("a distributing connection", mesh.distributing_connections.front().reference);
+    lacks("a distributing connection", mesh.distributing_connections.front().reference, "no format does");
   if (!mesh.equations.empty() && !mesh.equations.front().terms.empty())
     lacks("an equation", mesh.equations.front().terms.front().node);
 }
