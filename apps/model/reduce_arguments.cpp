@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <utility>
@@ -112,13 +113,33 @@ std::vector<int> selection(const ReducedBody& body, const std::string& text) {
     }
     return listed_modes(body, list);
   }
-  if (rule == "band" && values.size() == 2) return modes_in_band(body, values[0], values[1]);
+  if (rule == "band" && values.size() == 2) {
+    const std::vector<int> chosen = modes_in_band(body, values[0], values[1]);
+    require(!chosen.empty(),
+            fmt::format("--select band: none of the {} modes lies between {} and {} Hz; make more modes "
+                        "(--count)",
+                        body.n(), values[0], values[1]));
+    return chosen;
+  }
   if (rule == "mass" && values.size() == 1) return modes_by_effective_mass(body, values[0], {0, 1, 2});
   if (rule == "completeness" && values.size() == 1) return modes_by_completeness(body, values[0]);
   throw UsageError(
       fmt::format("--select: '{}' is not understood; there are list:1,3 band:LOW,HIGH mass:SHARE "
                   "completeness:SHARE output:SET.uy,SHARE",
                   text));
+}
+
+std::string note_of_selection(const ReducedBody& body, const std::string& text) {
+  const auto [rule, rest] = split(text, ':');
+  if (rule != "band") return "";
+  const double wanted = numbers("--select", rest).back();
+  double highest = 0;
+  for (const Coordinate& c : body.coordinates) highest = std::max(highest, c.frequency_hz);
+  return highest >= wanted ? ""
+                           : fmt::format(
+                                 "--select band: the modes computed end at {:.6g} Hz; what lies between that and "
+                                 "{:.6g} Hz is not kept (--count computes more)",
+                                 highest, wanted);
 }
 
 DampingRule parse_damping(const std::string& text) {

@@ -43,6 +43,8 @@ ReductionOptions reduction_options(const ReduceArguments&, const Model&);
 
 /// Coordinates that `select` keeps, counted from 0. @throws UsageError, and InputError for one that the body lacks.
 std::vector<int> selection(const ReducedBody&, const std::string& select);
+/// What the choice may have missed, in a sentence; empty: nothing.
+std::string note_of_selection(const ReducedBody&, const std::string& select);
 
 /// "modal:0.005", "loss-factor:0.01", "rayleigh:ALPHA,BETA", "none". @throws InputError.
 DampingRule parse_damping(const std::string&);

@@ -3,6 +3,8 @@
 #include "fem/base/check.hpp"
 #include "reduction/basis/static_shapes.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -44,8 +46,15 @@ Plan plan_of(const Mesh& mesh, const DofMap& dofs, const std::vector<InterfaceNo
   require(
       reference.empty() || rigid_freedoms(plan.held, dofs, plan.clamp) == 0,
       "craig-bampton: the reference interface \"" + reference + "\" does not hold the body; give it all components");
-  require(rigid_freedoms(plan.fixed, dofs, plan.clamp) == 0,
-          "craig-bampton: with all interfaces held the body can still move; keep more components");
+  require(
+      rigid_freedoms(plan.fixed, dofs, plan.clamp) == 0,
+      "craig-bampton: with the kept components of all interfaces held the body can still move; keep all six of each "
+      "(directions = \"all\"; \"hinge-plane\" keeps uy and rz), or name a reference");
+  const int loose = rigid_freedoms(plan.held, dofs, plan.clamp), own = rigid_freedoms(without_supports(mesh), dofs, {});
+  require(loose == 0 || loose == own,
+          fmt::format("craig-bampton: supports hold {} of the {} rigid motions; a body that flies is held in none "
+                      "(--free leaves its supports out), one that is held in all",
+                      own - loose, own));
   return plan;
 }
 

@@ -5,7 +5,9 @@
 #include "reduction/basis/mode_alignment.hpp"
 #include "reduction/basis/reduced_matrices.hpp"
 #include "reduction/basis/smooth_shapes.hpp"
+#include "reduction/eigen/backends.hpp"
 
+#include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
@@ -179,10 +181,11 @@ ModalBasis modes_of(const ModalModel& model, const Clamp& clamp, const Reduced& 
   const int rigid = rigid_freedoms(model.mesh, model.dofs, clamp);
   const int count = reduced.unknowns.count;
   EigenOptions whole = options;  // half a pair cannot be aligned, so its other half is solved for as well
-  whole.num_modes = options.num_modes >= count ? options.num_modes : options.num_modes + 1;
   whole.whole_groups = true;
   const MatrixXd start = smooth_shapes(model.mesh, model.dofs)(reduced.unknowns.free_dofs(), Eigen::all);
-  const EigenPairs pairs = solve_modes({reduced.K, reduced.M, rigid > 0, start}, whole);
+  const EigenProblem problem{reduced.K, reduced.M, rigid > 0, start};
+  if (options.num_modes < finite_eigenvalues(problem)) ++whole.num_modes;
+  const EigenPairs pairs = solve_modes(problem, whole);
   const auto masses_of = [&](const MatrixXd& Phi) {
     return quadratic_forms(reduced.M, Phi(reduced.unknowns.free_dofs(), Eigen::all));
   };
@@ -293,7 +296,16 @@ ModalBasis modes_of_kind(const std::function<ModalBasis(const EigenOptions&)>& s
   options.num_modes = kinds.size() == 1 ? 2 * count + 2 : count + count / 4 + 2;
   for (;; options.num_modes *= 2) {
     options.num_modes = std::min(options.num_modes, all);
-    const ModalBasis basis = solve(options);
+    ModalBasis basis;
+    try {
+      basis = solve(options);
+    } catch (const NumericalError&) {
+      if (options.num_modes < all) throw;
+      throw InputError(
+          fmt::format("modes: {} of the kinds asked for are too many for the {} unknowns of the mesh; refine "
+                      "the mesh or ask for fewer",
+                      count, all));
+    }
     std::vector<int> chosen;
     for (int i = 0; i < options.num_modes && std::ssize(chosen) < count; ++i) {
       const ModeKind kind = basis.kind[static_cast<size_t>(i)];

@@ -167,16 +167,19 @@ std::vector<int> modes_by_completeness(const ReducedBody& body, double fraction)
 }
 
 MatrixXd observabilities(const ReducedBody& body, const std::vector<ObservedOutput>& outputs) {
+  constexpr double negligible = 1e-10;  // round-off of a mode, against what its mass and the body's speak of
   MatrixXd share(std::ssize(outputs), body.n());
   for (size_t i = 0; i < outputs.size(); ++i) {
     const Marker& seen = marker(body, outputs[i].marker);
     const int component = component_of(outputs[i].direction);
     const VectorXd S = component < 3 ? seen.S.row(component) : seen.S_theta.row(component - 3);
+    const double length = std::sqrt(body.J0.trace() / body.m);
+    const double seen_at_all = component < 3 ? negligible : negligible / length;
     auto row = share.row(static_cast<Index>(i));
     for (int k = 0; k < body.n(); ++k) {
       const double omega = body.frequency(k);
       row(k) = S(k) * S(k) / (body.Me(k, k) * omega * omega * omega);
-      if (S(k) == 0) row(k) = 0;
+      if (std::abs(S(k)) <= seen_at_all * std::sqrt(body.Me(k, k) / body.m)) row(k) = 0;
     }
     const double largest = row.maxCoeff();
     for (int k = 0; k < body.n(); ++k) row(k) = std::isinf(largest) ? double(std::isinf(row(k))) : row(k) / largest;
@@ -188,6 +191,10 @@ MatrixXd observabilities(const ReducedBody& body, const std::vector<ObservedOutp
 std::vector<int> modes_by_observability(const ReducedBody& body, const std::vector<ObservedOutput>& outputs,
                                         double threshold) {
   const MatrixXd share = observabilities(body, outputs);
+  for (Index i = 0; i < share.rows(); ++i)
+    require(share.cols() == 0 || share.row(i).maxCoeff() > 0,
+            fmt::format("modes: none of all {} moves {} along {}; make more modes", body.n(),
+                        outputs[static_cast<size_t>(i)].marker, outputs[static_cast<size_t>(i)].direction));
   std::vector<int> chosen;
   for (int k = 0; k < body.n(); ++k) {
     if (share.rows() > 0 && share.col(k).maxCoeff() >= threshold) chosen.push_back(k);

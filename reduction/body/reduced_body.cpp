@@ -234,6 +234,22 @@ const Marker& marker(const ReducedBody& body, const std::string& name) {
                    (known.empty() ? "none" : known));
 }
 
+namespace {
+
+/// What the rigid motions that a free body's own coordinates hold have of Me: L^T M_r^-1 L, L the rows of Ct and Cr0.
+/// Nothing damps them.
+MatrixXd rigid_part_of_Me(const ReducedBody& body) {
+  if (body.frame != "free") return MatrixXd::Zero(body.n(), body.n());
+  MatrixXd L(6, body.n());
+  L << body.Ct, body.Cr0;
+  MatrixXd M_r(6, 6);
+  M_r << body.m * Eigen::Matrix3d::Identity(), -tilde(body.mc0), tilde(body.mc0), body.J0;
+  const MatrixXd part = L.transpose() * M_r.completeOrthogonalDecomposition().solve(L);
+  return 0.5 * (part + part.transpose());
+}
+
+}  // namespace
+
 void apply_damping(ReducedBody& body, const DampingRule& rule) {
   const std::string where = "body \"" + body.name + "\": damping";
   for (const double value : {rule.value, rule.alpha, rule.beta}) {
@@ -245,7 +261,7 @@ void apply_damping(ReducedBody& body, const DampingRule& rule) {
     // A loss factor eta damps a resonance as zeta = eta / 2.
     body.De = modal_damping(body, rule.name == "modal" ? rule.value : rule.value / 2);
   } else if (rule.name == "rayleigh") {
-    body.De = rule.alpha * body.Me + rule.beta * body.Ke;
+    body.De = rule.alpha * (body.Me - rigid_part_of_Me(body)) + rule.beta * body.Ke;
   } else {
     throw InputError(where + " rule \"" + rule.name +
                      R"(" is unknown; there are "none", "modal", "loss-factor", "rayleigh")");

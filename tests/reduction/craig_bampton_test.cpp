@@ -110,6 +110,27 @@ TEST(CraigBampton, FreeBodyHasSixMotionsWithoutEnergy) {
   EXPECT_LT((M_r.bottomRightCorner<3, 3>() - body.J0).norm(), 1e-12 * body.J0.norm());
 }
 
+// A boom that drifts or turns as a whole is not braked against anything.
+TEST(CraigBampton, RayleighDampingOfAFreeBodyLeavesItsRigidMotionsAlone) {
+  ReducedBody body = sip().body(with(4));
+  apply_damping(body, {"rayleigh", 0, 0.3, 2e-5});
+  MatrixXd L(6, body.n());
+  L << body.Ct, body.Cr0;
+  const MatrixXd rigid = body.Me.llt().solve(L.transpose());                   // their coordinates
+  EXPECT_LT((body.De * rigid).norm(), 1e-9 * (0.3 * body.Me * rigid).norm());  // round-off of Ke times 2e-5
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> modes(body.Ke, body.Me);
+  const VectorXd phi = modes.eigenvectors().col(6);
+  const double lambda = modes.eigenvalues()(6);
+  EXPECT_NEAR(phi.dot(body.De * phi) / (0.3 + 2e-5 * lambda), 1, 1e-8);  // elastic motions as ever
+}
+
+TEST(CraigBampton, SupportsHoldAllRigidMotionsOrNone) {
+  TwoEnds held = sip();
+  held.boom.mesh.supports.push_back({3, {true, true, true, false, false, false}});
+  EXPECT_THROW(held.basis(with(4)), InputError);
+  EXPECT_NO_THROW(held.basis(with(4, "root")));
+}
+
 TEST(CraigBampton, StaticTipResponseIsThatOfTheFullModel) {
   const TwoEnds t = sip();
   for (const bool orthonormal : {false, true}) {

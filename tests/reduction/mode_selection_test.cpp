@@ -160,6 +160,7 @@ TEST(ModeSelection, ObservabilityOfTheTipFallsLikeOmegaCubed) {
   EXPECT_EQ(modes_by_observability(body, {{"tip", "uy"}}, second * 1.001), (std::vector<int>{0}));
   EXPECT_EQ(modes_by_observability(body, {}, 0.1), std::vector<int>{});
   EXPECT_THROW(observabilities(body, {{"tipp", "uy"}}), InputError);
+  EXPECT_THROW(modes_by_observability(body, {{"tip", "ux"}}, 0.9), InputError);  // none of them stretches
 }
 
 TEST(ModeSelection, SelectedShapesMakeThePartOfTheBody) {
