@@ -18,6 +18,7 @@ int export_command(const ExportArguments& a, const CommonOptions& common) {
     require_usage(equals != std::string::npos, fmt::format("--set: '{}' must be NAME=VALUE", text));
     options.settings[text.substr(0, equals)] = text.substr(equals + 1);
   }
+  require_not_replaced(a.body, a.path);
   const ReducedBody body = read_body_file(a.body);
   const ExportReport report = export_body(body, a.format, options, a.path);
   const bool passed = std::ranges::all_of(report.checks, &BodyCheck::passed);
@@ -25,10 +26,12 @@ int export_command(const ExportArguments& a, const CommonOptions& common) {
     const nlohmann::ordered_json j = {{"file", a.path.string()},
                                       {"format", a.format},
                                       {"cannot_hold", report.cannot_hold},
+                                      {"doubts", body.provenance.doubts},
                                       {"checks", checks_json(report.checks)},
                                       {"passed", passed}};
     fmt::print("{}\n", j.dump(2));
   } else if (!common.quiet) {
+    if (!body.provenance.doubts.empty()) print_note("warning: " + body.provenance.doubts);
     for (const std::string& sentence : report.cannot_hold) print_note("note: " + sentence);
     fmt::print("{}{}\n", checks_text(report.checks), a.path.string());
   }

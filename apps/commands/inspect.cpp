@@ -62,6 +62,7 @@ int inspect_command(const std::filesystem::path& path, const CommonOptions& comm
   } else if (!common.quiet) {
     fmt::print("{}{}", description(body, checks), richer_text(file));
     const Provenance& p = body.provenance;
+    if (!p.doubts.empty()) print_note("warning: " + p.doubts);
     fmt::print("made by {} ({}) from {}\noptions: {}\nmesh: {}\n", p.program, p.libraries, p.source, p.options,
                p.mesh_hash);
   }

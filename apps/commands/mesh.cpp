@@ -1,3 +1,4 @@
+#include "apps/base/usage.hpp"
 #include "apps/commands/commands.hpp"
 #include "fem/formats/mesh_formats.hpp"
 
@@ -9,6 +10,7 @@ namespace flexboom {
 using nlohmann::ordered_json;
 
 int mesh_command(const MeshArguments& a, const CommonOptions& common) {
+  require_not_replaced(a.body, a.file);
   Model model = load_model(a.body, a.options);
   write_mesh(a.file, model.mesh);
   if (!model.clamped.empty())

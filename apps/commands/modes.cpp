@@ -1,3 +1,4 @@
+#include "apps/base/usage.hpp"
 #include "apps/commands/commands.hpp"
 #include "apps/commands/terminal_line.hpp"
 #include "apps/model/bounded_modes.hpp"
@@ -159,6 +160,7 @@ EigenOptions eigen_options(const ModesArguments& a, const Model& model) {
 
 int modes_command(const ModesArguments& a, const CommonOptions& common) {
   require(a.vtu.empty() || a.vtu.extension() == ".vtu", fmt::format("--vtu: '{}' must end in .vtu", a.vtu.string()));
+  require_not_replaced(a.model, a.vtu);
   const Stopwatch clock;
   std::optional<WorkLine> progress(std::in_place, !common.quiet && !common.json, "modes");
   Model model = load_model(a.model, a.options);

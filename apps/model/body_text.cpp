@@ -115,7 +115,8 @@ nlohmann::ordered_json body_json(const ReducedBody& body, const std::vector<Body
             {"libraries", p.libraries},
             {"source", p.source},
             {"mesh_hash", p.mesh_hash},
-            {"options", p.options}}},
+            {"options", p.options},
+            {"doubts", p.doubts}}},
           {"notes", notes}};
 }
 

@@ -112,6 +112,21 @@ PrestressedBasis prestressed_basis(const Mesh& mesh, const BasisModel& m, const 
   return made;
 }
 
+/// What becomes of supports that a file brings; empty where they are the frame, or there are none.
+std::string note_of_supports(const Model& model, const BasisModel& m, const BasisOptions& o) {
+  if (model.mesh.supports.empty() || !model.clamp.with_supports) return "";
+  if (o.name == "mean-axis") return "basis mean-axis: the body flies free, and the supports of its mesh are left out";
+  if (o.name != "craig-bampton" || o.reference.empty()) return "";
+  const std::vector<int>& held = m.held.nodes;
+  const bool beside = std::ranges::any_of(
+      model.mesh.supports, [&](const Support& s) { return std::ranges::find(held, s.node) == held.end(); });
+  return !beside ? ""
+                 : fmt::format(
+                       "craig-bampton: supports of the mesh hold it to the frame of \"{}\", too, wherever that "
+                       "flies; --free leaves them out",
+                       o.reference);
+}
+
 /// Rules by modes mean those of the body at rest: the damping of the clamped modes, of which the shapes are combined.
 bool damps_modes_at_rest(const ReductionOptions& o) {
   return o.damping.name != "rayleigh" && o.basis.corrections.empty();
@@ -127,6 +142,7 @@ ReducedBody make_reduced_body(Model& model, const ReductionOptions& options, int
   Stopwatch clock;
   const BasisModel m = basis_model(model.mesh, o.basis, model.clamp, o.clamp_beside, threads);
   seconds.assemble += clock.lap();
+  if (std::string note = note_of_supports(model, m, o.basis); !note.empty()) model.notes.push_back(std::move(note));
   std::optional<PrestressedBasis> prestressed;
   if (o.basis.name == "prestressed" && o.basis.modes > 0)
     prestressed = prestressed_basis(model.mesh, m, o.basis, threads);
@@ -136,6 +152,7 @@ ReducedBody make_reduced_body(Model& model, const ReductionOptions& options, int
   seconds.invariants += clock.lap();
   if (o.select) {
     const std::vector<int> list = selection(body, *o.select);
+    if (std::string note = note_of_selection(body, *o.select); !note.empty()) model.notes.push_back(std::move(note));
     basis = selected(basis, list);
     body = selected(body, list);
   }
@@ -165,8 +182,12 @@ ReducedBody make_reduced_body(Model& model, const ReductionOptions& options, int
       o.certified ? certificate(body, model.mesh, m.assembly, m.held, basis, exact_markers(o), threads, held_statics)
                   : check_invariants(body, model.mesh, m.assembly, basis);
   seconds.certificate += clock.lap();
-  body.provenance = {fmt::format("flexboom {}", version), libraries(), o.source, mesh_hash(model.mesh),
-                     options_text(o)};
+  body.provenance = {fmt::format("flexboom {}", version),
+                     libraries(),
+                     o.source,
+                     mesh_hash(model.mesh),
+                     options_text(o),
+                     fmt::format("{}", fmt::join(material_suspicions(model.mesh), "; "))};
   body.validate();
   return body;
 }

@@ -5,6 +5,7 @@
 #include "apps/scene/scene_keys.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/text_reader.hpp"
+#include "fem/formats/mesh_formats.hpp"
 #include "reduction/body_file/body_file.hpp"
 
 #include <fmt/format.h>
@@ -99,6 +100,12 @@ void read_file_of_body(TableReader& entry, Reading& reading, BodyScene& body) {
   };
   if (!entry.is_text("file")) return fault("is not a string; it must be the name of a body file");
   const std::filesystem::path path = reading.folder / entry.text("file");
+  const bool is_mesh = std::ranges::any_of(mesh_formats(), [&path](const MeshFormat& format) {
+    return std::ranges::find(format.extensions, path.extension().string()) != format.extensions.end();
+  });
+  if (is_mesh)
+    return fault(fmt::format("{0} is a mesh; a scene takes the body that `flexboom reduce {0} -o {1}.h5` makes of it",
+                             entry.text("file"), path.stem().string()));
   try {
     path.extension() == ".h5" ? read_reduced_file(path, body) : read_body_file(path, entry.path(), reading, body);
   } catch (const std::runtime_error& error) {

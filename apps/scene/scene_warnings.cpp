@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -100,11 +101,13 @@ void warn_of_overshoots(const Scene& scene, Warnings& warnings) {
   for (const WheelScene& w : scene.wheels) warn_of_overshoot("torque of wheel " + w.name, w.torque, warnings);
 }
 
-/// Springs that press on stops, starts beyond them, angles that may be in degrees.
-void warn_of_mechanism(const std::string& of, const HingeMechanism& m, const JointLaw& law, double start,
+/// Springs that press on stops, starts beyond them, angles that may be in degrees. `start`: none of a joint that closes
+/// a loop.
+void warn_of_mechanism(const std::string& of, const HingeMechanism& m, const JointLaw& law, std::optional<double> start,
                        std::string_view unit, Warnings& warnings) {
   constexpr double turns = 4 * std::numbers::pi;  // of a hinge, whose springs and stops count them
-  for (const auto& [what, value] : {std::pair("starts", start), std::pair("has the rest of its spring", m.rest)})
+  for (const auto& [what, value] :
+       {std::pair("starts", start.value_or(0)), std::pair("has the rest of its spring", m.rest)})
     if (unit == "rad" && std::abs(value) > turns)
       warnings.push_back(fmt::format("{}: {} at {:g} rad, {:.1f} turns; angles are in rad", of, what, value,
                                      std::abs(value) / (2 * std::numbers::pi)));
@@ -117,10 +120,10 @@ void warn_of_mechanism(const std::string& of, const HingeMechanism& m, const Joi
       warnings.push_back(
           fmt::format("{}: the spring is at rest at {:g} {}, beyond the stop at {:g} {}: it presses on it", of, m.rest,
                       unit, at, unit));
-    if (side * (start - at) > 0)
+    if (start && side * (*start - at) > 0)
       warnings.push_back(
-          fmt::format("{}: starts at {:g} {}, beyond the stop at {:g} {}: the stop is pressed in by {:g} {}", of, start,
-                      unit, at, unit, side * (start - at), unit));
+          fmt::format("{}: starts at {:g} {}, beyond the stop at {:g} {}: the stop is pressed in by {:g} {}", of,
+                      *start, unit, at, unit, side * (*start - at), unit));
   }
 }
 
@@ -128,9 +131,12 @@ void warn_of_mechanisms(const Scene& scene, Warnings& warnings) {
   for (const HingeScene& h : scene.hinges)
     warn_of_mechanism("hinge " + h.body, h.hinge.mechanism, {}, h.start_angle, "rad", warnings);
   for (const JointScene& j : scene.joints)
-    if (joint_type(j.kind).scalars == 1)
-      warn_of_mechanism("joint " + j.name, j.mechanism, j.law, j.start.empty() ? j.mechanism.rest : j.start[0],
-                        j.kind == JointKind::slider ? "m" : "rad", warnings);
+    if (joint_type(j.kind).scalars == 1) {
+      std::optional<double> start;
+      if (!j.closes_loop) start = j.start.empty() ? j.mechanism.rest : j.start[0];
+      warn_of_mechanism("joint " + j.name, j.mechanism, j.law, start, j.kind == JointKind::slider ? "m" : "rad",
+                        warnings);
+    }
 }
 
 /// Slits of beams, materials that are none, bodies that hardly vibrate, files that fail their own checks.
@@ -146,6 +152,8 @@ void warn_of_body(const BodyScene& b, Warnings& warnings) {
     warnings.push_back(
         fmt::format("body {}: its damping ratio is {:g}, with which nothing vibrates; 5 % is 0.05", b.name, ratio));
   if (!b.reduced) return;
+  if (const std::string& doubts = b.reduced->provenance.doubts; !doubts.empty())
+    warnings.push_back(fmt::format("body {}: its file {}: {}", b.name, b.reduced_file.string(), doubts));
   for (const BodyCheck& c : b.reduced->certificate)
     if (!c.passed)
       warnings.push_back(

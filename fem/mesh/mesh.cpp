@@ -130,7 +130,7 @@ void validate_properties(const Mesh& mesh) {
   for (size_t i = 0; i < mesh.beam_properties.size(); ++i) {
     within(fmt::format("beam_properties[{}]", i), [&] {
       const BeamProperty& property = mesh.beam_properties[i];
-      property.material.validate();
+      property.material.validate_of_beam();
       validate_sections(property.start, property.end, property.material, property.theory, property.shear);
     });
   }
@@ -307,6 +307,19 @@ std::string suspicion(const Material& m) {
                        m.E, m.rho);
 }
 
+std::vector<std::string> material_suspicions(const Mesh& mesh) {
+  std::vector<std::string> result;
+  const auto judge = [&result](const std::string& where, const Material& m) {
+    if (const std::string odd = suspicion(m); !odd.empty()) result.push_back(where + ": " + odd);
+  };
+  for (const SolidProperty& property : mesh.solid_properties) judge("\"" + property.name + "\"", property.material);
+  for (size_t i = 0; i < mesh.beam_properties.size(); ++i) {
+    const bool repeated = i > 0 && mesh.beam_properties[i].material.E == mesh.beam_properties[i - 1].material.E;
+    if (!repeated) judge(fmt::format("beam property {}", i), mesh.beam_properties[i].material);
+  }
+  return result;
+}
+
 std::vector<std::string> suspicions(const Mesh& mesh) {
   std::vector<std::string> result;
   if (std::string inverted = inverted_corners(mesh); !inverted.empty()) result.push_back(std::move(inverted));
@@ -321,14 +334,7 @@ std::vector<std::string> suspicions(const Mesh& mesh) {
     result.push_back(fmt::format("{} pairs of beams have the same nodes and lie side by side; the first are {} and {}",
                                  twice.size(), element_name(mesh, twice.front().first),
                                  element_name(mesh, twice.front().second)));
-  const auto judge = [&result](const std::string& where, const Material& m) {
-    if (const std::string odd = suspicion(m); !odd.empty()) result.push_back(where + ": " + odd);
-  };
-  for (const SolidProperty& property : mesh.solid_properties) judge("\"" + property.name + "\"", property.material);
-  for (size_t i = 0; i < mesh.beam_properties.size(); ++i) {
-    const bool repeated = i > 0 && mesh.beam_properties[i].material.E == mesh.beam_properties[i - 1].material.E;
-    if (!repeated) judge(fmt::format("beam property {}", i), mesh.beam_properties[i].material);
-  }
+  std::ranges::move(material_suspicions(mesh), std::back_inserter(result));
   return result;
 }
 

@@ -117,6 +117,9 @@ int part_count(const Mesh&);
 /// nothing joins, or a mean density that no material has (units mixed up). One sentence each.
 std::vector<std::string> suspicions(const Mesh&);
 
+/// Those of them that are about materials.
+std::vector<std::string> material_suspicions(const Mesh&);
+
 /// What is odd about a material in SI units; empty where nothing is.
 std::string suspicion(const Material&);
 

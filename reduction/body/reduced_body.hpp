@@ -64,6 +64,7 @@ struct Provenance {
   std::string source;     // file of the model
   std::string mesh_hash;  // of nodes, elements, properties and sets; empty of closed forms
   std::string options;    // what was asked, one line
+  std::string doubts;     // materials of the mesh that are none in SI units, one line; empty: all are
 };
 
 /// The body for pictures and for programs that want nodes: points (BRF) and the shapes there. Beams have lines, solids

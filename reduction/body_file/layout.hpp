@@ -207,6 +207,7 @@ void fields(Archive& a, Body& body) {
   a.values({"provenance/source", "", "file of the model"}, {}, std::vector{&p.source});
   a.values({"provenance/mesh_hash", "", "of nodes, elements, properties and sets"}, {}, std::vector{&p.mesh_hash});
   a.values({"provenance/options", "", "what was asked"}, {}, std::vector{&p.options});
+  a.values({"provenance/doubts", "", "materials that are none in SI units"}, {}, std::vector{&p.doubts});
   a.values({"full_freedoms", "1", "unknowns of the model; 0: closed form"}, {}, std::vector{&body.full_freedoms});
 }
 

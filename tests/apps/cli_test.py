@@ -1087,6 +1087,63 @@ material = { E = 70e9, nu = 0.3, rho = 2700 }
         self.assertIn("6 rigid motions of the body are not held", result.stderr)
         self.assert_exit(OK, flexboom(*reduce, "--clamp", "root"))
 
+    def test_what_is_read_is_not_overwritten(self):
+        mesh = self.mesh(BOOM4, "boom.vtu")
+        for command in (("mesh", mesh, "-o", mesh), ("modes", mesh, "--clamp", "root", "--vtu", mesh)):
+            result = flexboom(*command)
+            self.assert_exit(INPUT, result)
+            self.assertIn("would be overwritten", result.stderr)
+        self.modes(mesh, "--clamp", "root")
+
+    def test_an_attachment_sits_at_a_step_of_a_solid(self):
+        body = self.folder / "step.toml"
+        material = "material = { E = 70e9, nu = 0.3, rho = 2700 }"
+        body.write_text(
+            'format = "flexboom-body-1"\nname = "step"\n'
+            + "".join(f'[[segments]]\nshape = "round-bar"\ndiameter = {d}\nlength = {l}\n{material}\n'
+                      for d, l in ((0.03, 0.3), (0.02, 0.2)))
+            + '[[attachments]]\nname = "s"\nposition = 0.3\nmass = 0.2\n'
+        )
+        solid = self.modes(body, "--structure", "solid", "--count", "2")["frequencies_hz"]
+        beam = self.modes(body, "--count", "2")["frequencies_hz"]
+        np.testing.assert_allclose(solid, beam, rtol=0.01)  # shear of a step, and of the clamped face
+
+    def deck_of_a_bar(self, moduli, density, end="", length=1.0, height=0.02, width=0.04):
+        deck = self.folder / "bar.inp"
+        nodes = "".join(f"{i + 1}, {length * i / 10}, 0, 0\n" for i in range(11))
+        elements = "".join(f"{i}, {i}, {i + 1}\n" for i in range(1, 11))
+        deck.write_text(
+            f"*NODE\n{nodes}*ELEMENT, TYPE=B31, ELSET=E\n{elements}"
+            f"*BEAM SECTION, ELSET=E, MATERIAL=M, SECTION=RECT\n{height}, {width}\n0., 1., 0.\n"
+            f"*MATERIAL, NAME=M\n*ELASTIC\n{moduli}\n*DENSITY\n{density}\n{end}*BOUNDARY\n1, 1, 6\n"
+        )
+        return deck
+
+    def test_all_finite_frequencies_of_a_massless_bar_can_be_asked_for(self):
+        deck = self.deck_of_a_bar("70e9, 0.3", "0.", "*ELEMENT, TYPE=MASS, ELSET=EM\n100, 11\n*MASS, ELSET=EM\n2.\n")
+        hz = self.modes(deck, "--count", "3")["frequencies_hz"]
+        stretched = math.sqrt(70e9 * 0.02 * 0.04 / 1.0 / 2) / (2 * math.pi)
+        self.assertAlmostEqual(hz[2] / stretched, 1, delta=1e-8)
+        result = flexboom("modes", deck, "--count", "4")
+        self.assert_exit(INPUT, result)
+        self.assertIn("4 asked, but only 3", result.stderr)
+
+    def test_units_that_are_not_si_are_told_of_a_reduced_body_too(self):
+        deck = self.deck_of_a_bar("70e3, 0.3", "2.7e-9", length=1000.0, height=6.0, width=10.0)
+        body = self.folder / "mm.h5"
+        self.assert_exit(OK, flexboom("reduce", deck, "-o", body, "--count", "2"))
+        for command in (("inspect", body), ("export", body, "--to", "coupling", "-o", self.folder / "mm.json")):
+            self.assertIn("no material in Pa and kg/m^3", flexboom(*command).stderr, command)
+        scene = self.folder / "scene.toml"
+        text = (
+            'format = "flexboom-scene-1"\nname = "units"\n[[bodies]]\nname = "mm"\nfile = "{}"\n'
+            '[[joints]]\nkind = "fixed"\nb = {{ body = "mm", marker = "root" }}\n'
+        )
+        scene.write_text(text.format("mm.h5").replace(', marker = "root"', ""))
+        self.assertIn("no material in Pa and kg/m^3", flexboom("check", scene).stderr)
+        scene.write_text(text.format("bar.inp"))
+        self.assertIn("scene.toml:5:1: bodies[0]: file: bar.inp is a mesh", flexboom("check", scene).stderr)
+
     def test_formats_hold_the_same_body(self):
         clamp = ["--clamp", "root", "--material", "67e9,0.33,2840"]
         deck = self.mesh(BOOM4, "boom.inp", "--structure", "solid", "--element", "hex20")
@@ -1545,6 +1602,10 @@ start = 0.3
             result = flexboom("export", body, "--to", format_, "-o", self.folder / "x.mat")
             self.assert_exit(INPUT, result)
             self.assertIn(words, result.stderr.lower())
+        result = flexboom("export", body, "--to", "sid", "-o", body)
+        self.assert_exit(INPUT, result)
+        self.assertIn("would be overwritten", result.stderr)
+        self.assert_exit(OK, flexboom("inspect", body))
         result = flexboom("export", body, "--to", "sid", "-o", self.folder / "x.sid", "--set", "colour=red")
         self.assert_exit(INPUT, result)
         self.assertIn("colour", result.stderr)

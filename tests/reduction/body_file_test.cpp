@@ -109,8 +109,8 @@ class Bits {
     all(points, S, S_theta, lines, triangles);
   }
   void add(const Provenance& value) {
-    const auto& [program, libraries, source, mesh_hash, options] = value;
-    all(program, libraries, source, mesh_hash, options);
+    const auto& [program, libraries, source, mesh_hash, options, doubts] = value;
+    all(program, libraries, source, mesh_hash, options, doubts);
   }
   void add(const BodyCheck& value) {
     const auto& [name, number, reference, relative_error, passed] = value;
@@ -188,7 +188,7 @@ ReducedBody full_body() {
                   numbered_stack<Eigen::Matrix3Xd>(5, 3, n),
                   {{0, 1, 2}, {}, {4, 3}},
                   {{0, 1, 2}, {2, 1, 4}}};
-  body.provenance = {"flexboom 0.1.0", "HDF5 1.10", "boom.msh", "f00d", "modes = 4"};
+  body.provenance = {"flexboom 0.1.0", "HDF5 1.10", "boom.msh", "f00d", "modes = 4", "E = 1, rho = 1"};
   constexpr double inf = std::numeric_limits<double>::infinity();
   body.certificate = {{"m = t^T M t", 1, 2, 0.5, false}, {"", inf, -inf, std::nan("7"), true}};
   body.full_freedoms = 2'000'000'000;
