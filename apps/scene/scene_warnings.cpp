@@ -53,14 +53,20 @@ void warn_of_idle_keys(const Scene& scene, Warnings& warnings) {
     idle("body " + b.name, fmt::format("{} {}", fmt::join(keys, ", "), keys.size() > 1 ? "do" : "does"),
          fmt::format("structure is \"{}\" and has no beams", b.structure));
   }
+  bool has_stop = false;
+  const auto look_at = [&](const std::string& of, const HingeMechanism& m, const JointLaw& law,
+                           const HingeMechanism& usual) {
+    has_stop = has_stop || m.stop_stiffness > 0 || law.upper_stop || law.lower_stop;
+    if (m.threshold != usual.threshold && !(m.stop_stiffness > 0))
+      idle(of, "threshold does", "without stop_stiffness there is no stop");
+    if (m.rest != usual.rest && !(m.stiffness > 0)) idle(of, "rest does", "without stiffness there is no spring");
+  };
+  for (const HingeScene& h : scene.hinges) look_at("hinge " + h.body, h.hinge.mechanism, h.law, {});
   for (const JointScene& j : scene.joints) {
-    const bool has_mechanism = joint_type(j.kind).scalars == 1;
-    if (has_mechanism && j.mechanism.threshold != 0 && !(j.mechanism.stop_stiffness > 0))
-      idle("joint " + j.name, "threshold does", "without stop_stiffness there is no stop");
-    if (has_mechanism && j.mechanism.rest != 0 && !(j.mechanism.stiffness > 0))
-      idle("joint " + j.name, "rest does", "without stiffness there is no spring");
+    if (joint_type(j.kind).scalars == 1) look_at("joint " + j.name, j.mechanism, j.law, {.rest = 0, .threshold = 0});
     if (j.kind == JointKind::free && j.loads) idle("joint " + j.name, "loads does", "a free joint bears none");
   }
+  if (scene.settle != Scene{}.settle && !has_stop) idle("integrator", "settle does", "no joint has a stop");
   for (const SpringScene& s : scene.springs)
     if (s.stiffness == 0 && s.damping == 0) idle("spring " + s.name, "it does", "stiffness and damping are 0");
   for (const LoadScene& l : scene.loads)

@@ -117,6 +117,23 @@ std::vector<double> corners_of(const Drive& drive, double duration, int samples)
   return corners;
 }
 
+std::vector<double> times_of_extremes(const std::vector<Drive>& drives, double duration, int samples) {
+  Reals times;
+  for (const Drive& d : drives) {
+    const Reals corners = corners_of(d, duration, samples);
+    Reals looks;  // between corners a pulse may be shorter than the samples
+    for (int i = 0; i <= samples; ++i) looks.push_back(duration * i / samples);
+    for (size_t i = 1; i < corners.size(); ++i) looks.push_back(0.5 * (corners[i - 1] + corners[i]));
+    Reals values;
+    for (const double t : looks) values.push_back(d.felt()(t));
+    const auto [least, most] = std::ranges::minmax_element(values);
+    for (const auto& extreme : {least, most}) times.push_back(looks[static_cast<size_t>(extreme - values.begin())]);
+  }
+  std::ranges::sort(times);
+  times.erase(std::ranges::unique(times).begin(), times.end());
+  return times;
+}
+
 int samples_of(const Scene& scene, const std::vector<Drive>& drives) {
   constexpr double most = 1 << 20;
   double samples = std::max(4096.0, 4 * scene.duration / scene.output_step);

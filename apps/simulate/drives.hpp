@@ -23,6 +23,9 @@ struct Drive {
 /// Of joints, loads and wheels. Constants are none. @throws InputError as course_of.
 std::vector<Drive> drives_of(const Scene&);
 
+/// When each of them is largest, and in both directions, ascending [s]; a formula is looked at so many times.
+std::vector<double> times_of_extremes(const std::vector<Drive>&, double duration, int samples);
+
 /// Where it is not smooth, ascending [s]; a formula is looked at so many times.
 std::vector<double> corners_of(const Drive&, double duration, int samples);
 

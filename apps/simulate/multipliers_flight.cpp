@@ -107,6 +107,7 @@ std::vector<LargestStiffening> largest_stiffening(const Multipliers& system, con
   const size_t stride = flight.states.size() / looks_at_stiffening + 1;
   for (size_t row = 0; row < flight.states.size(); row += stride)
     observe(stiffening_effect(system, flight.time[row], flight.states[row]), flight.time[row], largest);
+  for (const auto& [t, state] : flight.telling) observe_size(stiffening_effect(system, t, state), largest);
   return largest;
 }
 

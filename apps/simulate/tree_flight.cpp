@@ -273,6 +273,7 @@ void set_corners(const Scene& scene, IntegratorOptions& o) {
   }
   constexpr double of_tolerance = 1e-3;
   o.step_ends = smooth_pieces(functions, scene.duration, samples, of_tolerance * scene.step_tolerance());
+  o.telling_times = times_of_extremes(drives, scene.duration, samples);
   std::ranges::sort(o.corners);
   o.corners.erase(std::unique(o.corners.begin(), o.corners.end()), o.corners.end());
 }
@@ -306,6 +307,14 @@ std::vector<char> held_at_both_ends(const Multibody& bodies) {
   return held;
 }
 
+/// A blow of a rigid stop is in no look: it has no duration.
+bool has_blows(const Multibody& bodies) {
+  return std::ranges::any_of(bodies.joints, [](const Joint& j) {
+    const auto is_rigid = [](const std::optional<StopLaw>& stop) { return stop && stop->restitution; };
+    return is_rigid(j.law.upper_stop) || is_rigid(j.law.lower_stop);
+  });
+}
+
 EnergyOfRun ledger_of(const Balance& b) { return {b.kinetic, b.potential, b.work, b.ledger}; }
 
 /// What results are made of.
@@ -321,9 +330,12 @@ std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& wh
   const Multibody& bodies = plain.scene();
   std::vector<Stiffening> none(bodies.bodies.size(), Stiffening::off);
   if (std::ranges::none_of(bodies.bodies, has_stiffening)) return none;
+  const std::vector<Drive> drives = drives_of(scene);
+  const std::vector<double> times = times_of_extremes(drives, scene.duration, samples_of(scene, drives));
   std::vector<Stiffening> choice =
-      stiffening_where_it_counts(plain, first_state(scene, plain), scene.duration, scene.tolerance);
-  const std::vector<char> held = held_at_both_ends(whole);
+      stiffening_where_it_counts(plain, first_state(scene, plain), scene.duration, scene.tolerance, times);
+  std::vector<char> held = held_at_both_ends(whole);
+  if (has_blows(whole)) held.assign(held.size(), 1);
   for (size_t i = 0; i < choice.size(); ++i) {
     if (held[i]) choice[i] = Stiffening::on;
     if (scene.bodies[i].stiffening == "on" && bodies.bodies[i].n() > 0) choice[i] = Stiffening::on;

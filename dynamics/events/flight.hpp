@@ -57,6 +57,8 @@ struct FlightOptions {
   std::vector<double> corners{};
   /// No step passes these times, ascending [s]: what forces do between them no step overlooks.
   std::vector<double> step_ends{};
+  /// When something may be largest between two outputs, ascending [s]: geometric stiffness is looked at there, too.
+  std::vector<double> telling_times{};
   long max_steps = 200'000'000;
   const std::atomic<bool>* interrupt = nullptr;                // set from outside: stop and return what there is
   std::function<void(double time, double duration)> progress;  // called now and then

@@ -80,6 +80,8 @@ struct MultibodyTrajectory {
   std::vector<Balance> balance;  // momenta with the wheels'
   std::vector<StopEvent> events;
   MultipliersSummary summary;
+  /// Between the outputs, where loads may be largest, see TellingMoments.
+  std::vector<std::pair<double, MultibodyState>> telling;
 };
 
 /// The equations of motion in redundant coordinates (eq. 12): every body has R, quaternion, q, velocity, omega, q_dot;

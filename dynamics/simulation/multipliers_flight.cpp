@@ -1,4 +1,5 @@
 #include "dynamics/events/event_loop.hpp"
+#include "dynamics/events/telling_moments.hpp"
 #include "dynamics/numerics/crossing.hpp"
 #include "dynamics/numerics/ida.hpp"
 #include "dynamics/redundant/balance.hpp"
@@ -386,12 +387,22 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   void observe(const VectorXd& y) override {
     scales_->observe(y);
     follow_turns();
+    if (moments_.at(
+            t_, [&](size_t joint) { return way(joint, y.data()).value + scene_.joints[joint].mechanism.threshold; }))
+      result_.telling.emplace_back(t_, state_of(t_, y).first);
   }
 
   void keep_rows(size_t rows) override { result_.states.resize(rows), result_.balance.resize(rows); }
 
-  /// Multipliers of an output are those of its motion, not interpolated.
   void record(double t, VectorXd y) override {
+    auto [state, balance] = state_of(t, std::move(y));
+    result_.time.push_back(t);
+    result_.states.push_back(std::move(state));
+    result_.balance.push_back(balance);
+  }
+
+  /// Its multipliers are those of the motion, not interpolated.
+  std::pair<MultibodyState, Balance> state_of(double t, VectorXd y) {
     VectorXd y_dot;
     equations_.make_consistent(t, y, y_dot, memory_);
     MultibodyState s;
@@ -418,9 +429,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     Balance balance = balance_of(equations_, y, memory_);
     frame_->leave(t, s, balance);
     s.ledger = balance.ledger, s.work = balance.work, s.dissipated = balance.dissipated;
-    result_.time.push_back(t);
-    result_.states.push_back(std::move(s));
-    result_.balance.push_back(balance);
+    return {std::move(s), balance};
   }
 
   void finish() override {
@@ -434,6 +443,7 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   const Multibody& scene_;
   const MultipliersOptions& options_;
   ConstraintWatch watch_{equations_};
+  TellingMoments moments_{scene_.joints, options_};
   JointMemory memory_;
   std::vector<double> levels_ = std::vector<double>(contacts_.size());  // of the stops' gaps, where a step ends
   std::vector<Clearance> before_;                                       // of the stops and switches, before the step

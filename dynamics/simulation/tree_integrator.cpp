@@ -2,6 +2,7 @@
 
 #include "dynamics/events/conservation.hpp"
 #include "dynamics/events/event_loop.hpp"
+#include "dynamics/events/telling_moments.hpp"
 #include "dynamics/methods/error_scales.hpp"
 #include "dynamics/methods/linear_parts.hpp"
 #include "dynamics/methods/ode.hpp"
@@ -75,6 +76,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
         work_(tree.workspace()),
         has_stiffening_(
             std::ranges::any_of(tree.scene().bodies, [](const ReducedBody& b) { return !b.Kg.spin.empty(); })),
+        moments_(tree.scene().joints, options),
         effect_(tree.scene().bodies.size()),
         y_dot_(y0.size()),
         flags_(contacts_.closed()),
@@ -192,6 +194,11 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     scales_.observe(y);
     for (const TreeLayout::Joint& j : tree_.layout().joints)
       if (j.omega >= 0) fastest_turn_ = std::max(fastest_turn_, y.segment<3>(j.omega).norm());
+    if (has_stiffening_ && moments_.at(t_, [&](size_t joint) {
+          const auto i = static_cast<int>(joint);
+          return tree_.gap(y.data(), i) + tree_.scene().joints[joint].mechanism.threshold;
+        }))
+      look_between(y);
   }
   void keep_rows(size_t rows) override {
     result_.y.resize(rows), result_.balance.resize(rows);
@@ -219,9 +226,16 @@ class TreeFlight final : public Flight<TreeTrajectory> {
     const double outputs = (options_.duration - options_.start) / options_.output_step;
     const auto stride = static_cast<size_t>(outputs / looks_at_stiffening) + 1;
     if (result_.time.size() % stride != 0) return;
-    const std::vector<char> contact = contacts_.by_joint(contacts_.closed());
-    flexboom::observe(tree_.stiffening_effect(t, y, contact, *work_, laws_.branches()), t, effect_);
+    flexboom::observe(stiffening(t, y), t, effect_);
     if (look_) look_(effect_);
+  }
+  void look_between(VectorXd y) {
+    tree_.impose(t_, y);
+    observe_size(stiffening(t_, y), effect_);
+    if (look_) look_(effect_);
+  }
+  std::vector<StiffeningEffect> stiffening(double t, const VectorXd& y) {
+    return tree_.stiffening_effect(t, y, contacts_.by_joint(contacts_.closed()), *work_, laws_.branches());
   }
 
   void finish() override {
@@ -247,7 +261,8 @@ class TreeFlight final : public Flight<TreeTrajectory> {
   Pilot* pilot_;
   const StiffeningLook& look_;
   TreeWorkspaceHandle work_;
-  bool has_stiffening_;                    // has any body a Kg?
+  bool has_stiffening_;  // has any body a Kg?
+  TellingMoments moments_;
   std::vector<LargestStiffening> effect_;  // per body
   VectorXd y_dot_, blow_;                  // blow: change of the state per impulse
   std::vector<double> hold_of_blow_;       // per joint
@@ -267,6 +282,10 @@ void observe(const std::vector<StiffeningEffect>& effect, double t, std::vector<
     const double lasting = std::min(effect[b].softening, std::exchange(l.last_softening, effect[b].softening));
     if (lasting > l.softening) l.softening = lasting, l.time = t;
   }
+}
+
+void observe_size(const std::vector<StiffeningEffect>& effect, std::vector<LargestStiffening>& largest) {
+  for (size_t b = 0; b < effect.size(); ++b) largest[b].size = std::max(largest[b].size, effect[b].size);
 }
 
 double change_without_stiffening(const ReducedBody& body, double size, double duration) {
@@ -350,7 +369,8 @@ TreeTrajectory integrate(const Tree& tree, const VectorXd& y0, const IntegratorO
   }
 }
 
-std::vector<Stiffening> stiffening_where_it_counts(const Tree& tree, VectorXd y, double duration, double tolerance) {
+std::vector<Stiffening> stiffening_where_it_counts(const Tree& tree, VectorXd y, double duration, double tolerance,
+                                                   std::span<const double> times) {
   const Multibody& scene = tree.scene();
   const std::vector<char> open(scene.joints.size(), 0);
   std::vector<Stiffening> choice(scene.bodies.size(), Stiffening::off);
@@ -359,9 +379,10 @@ std::vector<Stiffening> stiffening_where_it_counts(const Tree& tree, VectorXd y,
       std::ranges::any_of(scene.joints, [](const Joint& joint) { return !joint.prescribed.empty(); }) ||
       std::ranges::any_of(scene.wheels, [](const ReactionWheel& w) { return static_cast<bool>(w.torque); });
   const int samples = goes_with_time ? 100 : 0;
+  std::vector<double> looks(times.begin(), times.end());
+  for (int i = 0; i <= samples; ++i) looks.push_back(i == 0 ? 0 : duration * i / samples);
   const TreeWorkspaceHandle work = tree.workspace();
-  for (int i = 0; i <= samples; ++i) {
-    const double t = i == 0 ? 0 : duration * i / samples;
+  for (const double t : looks) {
     tree.impose(t, y);
     const std::vector<StiffeningEffect> effect = tree.stiffening_effect(t, y, open, *work);
     for (size_t b = 0; b < effect.size(); ++b)

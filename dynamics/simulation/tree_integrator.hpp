@@ -4,6 +4,7 @@
 #include "dynamics/relative/tree.hpp"
 
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,8 @@ struct LargestStiffening {
 /// A long flight is looked at this often: each look costs an evaluation and an eigenvalue problem per body.
 inline constexpr int looks_at_stiffening = 200;
 void observe(const std::vector<StiffeningEffect>&, double t, std::vector<LargestStiffening>&);
+/// Of a moment between two outputs: what is that short is no buckling.
+void observe_size(const std::vector<StiffeningEffect>&, std::vector<LargestStiffening>&);
 
 /// The change where a geometric stiffness of this size (of StiffeningEffect) is left out for so long [s], relative to
 /// what the body does. It is the size, or more. A mode that is stiffer by e runs ahead by e / 2 for each radian that it
@@ -40,7 +43,7 @@ struct TreeTrajectory {
   std::vector<std::vector<LawBranch>> laws;  // per joint; empty where no joint has a law
   std::vector<StopEvent> events;
   IntegrationSummary summary;                        // momentum_drift: unknown where something holds or pushes
-  std::vector<LargestStiffening> stiffening_effect;  // per body, at the outputs
+  std::vector<LargestStiffening> stiffening_effect;  // per body, at outputs and telling moments
   std::vector<std::string> warnings;
 };
 
@@ -54,7 +57,8 @@ TreeTrajectory integrate(const Tree&, const Eigen::VectorXd& y0, const Integrato
 
 /// For each body: on where the geometric stiffness changes more than `tolerance` (`change_without_stiffening`). The
 /// stiffness is looked at as it is at the start. It is also looked at under the prescribed motions until `duration`
-/// [s], at rest relative to them.
-std::vector<Stiffening> stiffening_where_it_counts(const Tree&, Eigen::VectorXd y0, double duration, double tolerance);
+/// [s], at rest relative to them, at some times and at those given.
+std::vector<Stiffening> stiffening_where_it_counts(const Tree&, Eigen::VectorXd y0, double duration, double tolerance,
+                                                   std::span<const double> times = {});
 
 }  // namespace flexboom

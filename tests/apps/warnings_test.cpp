@@ -123,6 +123,7 @@ TEST(Warnings, OfKeysThatDoNothing) {
       with(swing_on_joints, "modes = 1", "modes = 1\nstructure = \"eq14\"\nrotary_inertia = false\norder = 6");
   EXPECT_TRUE(has(closed, "body boom: rotary_inertia, order do nothing, structure is \"eq14\" and has no beams"));
   EXPECT_TRUE(has(swing_on_joints + "threshold = 0.3\n", "joint hinge: threshold does nothing"));
+  EXPECT_TRUE(has(swing_on_joints + "[integrator]\nsettle = 0.1\n", "integrator: settle does nothing"));
   EXPECT_FALSE(has(swing_on_joints + "threshold = 0.3\nstop_stiffness = 2\n", "nothing"));
   EXPECT_TRUE(has(with(swing_on_joints, "stiffness = 1\n", "rest = 0.1\n"), "joint hinge: rest does nothing"));
   EXPECT_TRUE(has(with(swing_on_joints, "kind = \"free\"\n", "kind = \"free\"\nloads = true\n"),

@@ -132,6 +132,8 @@ void read_elastic(Deck& deck, const Keyword& keyword) {
     ElasticRow row{};
     row.E = deck.real((*fields)[0], "Young's modulus");
     row.nu = deck.real_or_zero(*fields, 1, "Poisson's ratio");
+    if (fields->size() < 2)
+      deck.notes.add(fmt::format("*ELASTIC of {}: Poisson's ratio is left out and 0", material.name));
     row.temperature = row_temperature(deck, keyword, *fields, 2, material.elastic);
     if (row.E <= 0) deck.fail((*fields)[0], "Young's modulus must be positive");
     if (row.nu <= -1 || row.nu >= 0.5)
