@@ -130,7 +130,7 @@ std::vector<double> times_of_extremes(const std::vector<Drive>& drives, double d
     for (const auto& extreme : {least, most}) times.push_back(looks[static_cast<size_t>(extreme - values.begin())]);
   }
   std::ranges::sort(times);
-  times.erase(std::ranges::unique(times).begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
   return times;
 }
 

@@ -296,7 +296,12 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
     set_energies(of_flight, all, r.tree->layout(), y0);
     flight = integrate_multipliers(*system, closed, of_flight, checkpoint);
     effect = largest_stiffening(*system, flight);
-    return flight.summary.interrupted;
+    const auto range = [&](size_t joint) {
+      const auto coordinate = [joint](const MultibodyState& s) { return s.coordinate[joint]; };
+      const auto [lowest, highest] = std::ranges::minmax_element(flight.states, {}, coordinate);
+      return std::pair(coordinate(*lowest), coordinate(*highest));
+    };
+    return Flown{flight.summary.interrupted, least_motion(all, range)};
   };
   fly_until_settled(scene, opened, effect, stiffening, fly);
   r.motion.stiffening_effect = effect;

@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -344,12 +345,44 @@ std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& wh
   return choice;
 }
 
+double least_motion(const Multibody& bodies, const std::function<std::pair<double, double>(size_t joint)>& range) {
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < bodies.joints.size(); ++i) {
+    const Joint& j = bodies.joints[i];
+    const bool is_free = j.kind == JointKind::hinge || j.kind == JointKind::slider;
+    if (!is_free || !j.prescribed.empty() || j.closes_loop) continue;
+    const ReducedBody& carried = bodies.bodies[static_cast<size_t>(j.b.body)];
+    const double length = std::sqrt(carried.J0.trace() / carried.m);
+    constexpr double round_off = 1e-12;  // of the length
+    const auto [lowest, highest] = range(i);
+    const double way = (highest - lowest) * (j.kind == JointKind::hinge ? length : 1);
+    least = std::min(least, std::max(way, round_off * length));
+  }
+  return least;
+}
+
+namespace {
+
+/// Over a flight.
+double least_motion(const Tree& tree, const std::vector<VectorXd>& y) {
+  return least_motion(tree.scene(), [&](size_t joint) {
+    const int scalar = tree.layout().joints[joint].scalar;
+    const auto [lowest, highest] =
+        std::ranges::minmax_element(y, {}, [scalar](const VectorXd& row) { return row[scalar]; });
+    return std::pair((*lowest)[scalar], (*highest)[scalar]);
+  });
+}
+
+}  // namespace
+
 bool revise_stiffening(const Scene& scene, const Multibody& bodies, const std::vector<LargestStiffening>& effect,
-                       std::vector<Stiffening>& choice) {
+                       std::vector<Stiffening>& choice, double least_motion) {
   bool changed = false;
   for (size_t i = 0; i < choice.size(); ++i) {
-    const bool wanted = scene.bodies[i].stiffening == "auto" && has_stiffening(bodies.bodies[i]) &&
-                        change_without_stiffening(bodies.bodies[i], effect[i].size, scene.duration) > scene.tolerance;
+    const bool changes =
+        change_without_stiffening(bodies.bodies[i], effect[i].size, scene.duration) > scene.tolerance ||
+        effect[i].shortening > scene.tolerance * least_motion;
+    const bool wanted = scene.bodies[i].stiffening == "auto" && has_stiffening(bodies.bodies[i]) && changes;
     if (!wanted || choice[i] == Stiffening::on) continue;
     choice[i] = Stiffening::on;
     changed = true;
@@ -363,12 +396,12 @@ bool will_be_revised(const Scene& scene, const Multibody& bodies, const std::vec
 }
 
 void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<LargestStiffening>& effect,
-                       std::vector<Stiffening>& choice, const std::function<bool()>& fly) {
+                       std::vector<Stiffening>& choice, const std::function<Flown()>& fly) {
   for (bool again = true; again;) {
     effect.assign(choice.size(), {});
     try {
-      const bool interrupted = fly();
-      again = !interrupted && revise_stiffening(scene, bodies, effect, choice);
+      const Flown flown = fly();
+      again = !flown.interrupted && revise_stiffening(scene, bodies, effect, choice, flown.least_motion);
     } catch (const NumericalError&) {
       if (!revise_stiffening(scene, bodies, effect, choice)) throw;
     }
@@ -431,7 +464,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
     set_corners(scene, options);
     if (scene.from) options.stops = scene.from->stops(joint_names(scene));
     flight = integrate(*r.tree, first_state(scene, *r.tree), options, checkpoint, look);
-    return flight.summary.interrupted;
+    return Flown{flight.summary.interrupted, least_motion(*r.tree, flight.y)};
   };
   fly_until_settled(scene, multibody, effect, stiffening, fly);
   r.end = end_of(r, scene, flight.time.back(), flight.y.back(), flight.summary);

@@ -154,6 +154,7 @@ std::vector<StiffeningEffect> Tree::stiffening_effect(double t, const VectorXd& 
     const Vec3<double> a = s.acceleration.t + cross(s.acceleration.w, o) + cross(s.w, cross(s.w, o));
     bodies.move(static_cast<size_t>(link.index), in_brf(s.w), in_brf(a), in_brf(s.acceleration.w),
                 VectorXd::Map(s.q_ddot.data(), link.body.n));
+    bodies.bend(static_cast<size_t>(link.index), y.segment(link.q, link.body.n));
     loads[static_cast<size_t>(link.joint)] = load_on_b(s);
   }
   bodies.push_by_joints(loads);

@@ -15,6 +15,16 @@ using Eigen::Vector3d;
 
 LoadedBodies::LoadedBodies(const Multibody& scene, Where where) : scene_(scene), where_(std::move(where)) {
   for (const ReducedBody& body : scene.bodies) K_.emplace_back(MatrixXd::Zero(body.n(), body.n()));
+  shortening_.resize(K_.size());
+}
+
+void LoadedBodies::bend(size_t body, const Eigen::VectorXd& q) {
+  for (const MarkerStiffness& m : scene_.bodies[body].Kg.markers) {
+    Vector3d u2 = Vector3d::Zero();
+    for (size_t i = 0; i < m.force.size() && q.size() > 0; ++i)
+      u2[static_cast<Eigen::Index>(i)] = -0.5 * q.dot(m.force[i] * q);
+    shortening_[body] = std::max(shortening_[body], u2.norm());
+  }
 }
 
 void LoadedBodies::move(size_t body, const Vector3d& omega, const Vector3d& acceleration,
@@ -74,7 +84,7 @@ std::vector<StiffeningEffect> LoadedBodies::effects() const {
   std::vector<StiffeningEffect> effects;
   for (size_t i = 0; i < K_.size(); ++i) {
     const auto [least, most] = relative_stiffness(scene_.bodies[i], K_[i]);
-    effects.push_back({std::max(-least, most), std::max(-least, 0.0)});
+    effects.push_back({std::max(-least, most), std::max(-least, 0.0), shortening_[i]});
   }
   return effects;
 }

@@ -22,6 +22,8 @@ class LoadedBodies {
   /// angular acceleration [rad/s^2]. And the accelerations of its coordinates.
   void move(size_t body, const Eigen::Vector3d& omega, const Eigen::Vector3d& acceleration,
             const Eigen::Vector3d& angular_acceleration, const Eigen::VectorXd& q_ddot);
+  /// Coordinates of a body; empty: zeros.
+  void bend(size_t body, const Eigen::VectorXd& q);
   /// One load per joint.
   void push_by_joints(const std::vector<JointLoad>&);
   void push_by_loads(double t);
@@ -37,6 +39,7 @@ class LoadedBodies {
   const Multibody& scene_;
   Where where_;
   std::vector<Eigen::MatrixXd> K_;
+  std::vector<double> shortening_;  // of the markers [m], the largest
 };
 
 }  // namespace flexboom

@@ -142,6 +142,7 @@ std::vector<StiffeningEffect> stiffening_effect(const Multipliers& system, doubl
     const Matrix3d to_body = rotation_matrix(s.bodies[i].attitude).transpose();
     bodies.move(i, s.bodies[i].omega, to_body * (s.accelerations[i].of_origin - p.scene.gravity),
                 s.accelerations[i].angular, s.accelerations[i].of_q);
+    bodies.bend(i, s.bodies[i].q);
   }
   bodies.push_by_joints(joint_loads(system, s));
   bodies.push_by_loads(t);

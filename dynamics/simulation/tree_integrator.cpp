@@ -278,7 +278,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
 void observe(const std::vector<StiffeningEffect>& effect, double t, std::vector<LargestStiffening>& largest) {
   for (size_t b = 0; b < effect.size(); ++b) {
     LargestStiffening& l = largest[b];
-    l.size = std::max(l.size, effect[b].size);
+    l.size = std::max(l.size, effect[b].size), l.shortening = std::max(l.shortening, effect[b].shortening);
     const double lasting = std::min(effect[b].softening, std::exchange(l.last_softening, effect[b].softening));
     if (lasting > l.softening) l.softening = lasting, l.time = t;
   }

@@ -16,6 +16,7 @@ struct LargestStiffening {
   double softening = 0;       // that lasts from one look to the next
   double time = 0;            // of that [s]
   double last_softening = 0;  // at the last look
+  double shortening = 0;      // [m]
 };
 /// A long flight is looked at this often: each look costs an evaluation and an eigenvalue problem per body.
 inline constexpr int looks_at_stiffening = 200;

@@ -238,13 +238,13 @@ namespace {
 
 /// What the rigid motions that a free body's own coordinates hold have of Me: L^T M_r^-1 L, L the rows of Ct and Cr0.
 /// Nothing damps them.
-MatrixXd rigid_part_of_Me(const ReducedBody& body) {
-  if (body.frame != "free") return MatrixXd::Zero(body.n(), body.n());
-  MatrixXd L(6, body.n());
+Eigen::MatrixXd rigid_part_of_Me(const ReducedBody& body) {
+  if (body.frame != "free") return Eigen::MatrixXd::Zero(body.n(), body.n());
+  Eigen::MatrixXd L(6, body.n());
   L << body.Ct, body.Cr0;
-  MatrixXd M_r(6, 6);
+  Eigen::MatrixXd M_r(6, 6);
   M_r << body.m * Eigen::Matrix3d::Identity(), -tilde(body.mc0), tilde(body.mc0), body.J0;
-  const MatrixXd part = L.transpose() * M_r.completeOrthogonalDecomposition().solve(L);
+  const Eigen::MatrixXd part = L.transpose() * M_r.completeOrthogonalDecomposition().solve(L);
   return 0.5 * (part + part.transpose());
 }
 

@@ -158,7 +158,7 @@ std::vector<BodyCheck> body_checks(const ReducedBody& body) {
 std::vector<BodyCheck> certificate(const ReducedBody& body, const Mesh& mesh, const Assembly& assembly,
                                    const Clamp& clamp, const ModalBasis& basis,
                                    const std::vector<std::string>& exact_at, int threads, const StaticSolver* statics) {
-  std::vector<BodyCheck> checks = check_invariants(body, mesh, assembly, basis, sum_round_off);
+  std::vector<BodyCheck> checks = check_invariants(body, mesh, assembly, basis);
   add_rigid_energy(checks, mesh, assembly, threads);
   if (body.n() > 0 && body.frame == "clamped") {
     const Unknowns left = unknowns(mesh, assembly.dofs, clamp);

@@ -80,6 +80,14 @@ TEST(StiffeningChoice, SeesPadsThatPushBetweenOutputs) {
   EXPECT_TRUE(is_on(pad + "[integrator]\nformulation = \"multipliers\"\n"));
 }
 
+// The tip goes across, so the strip gets shorter, and that is all that moves it along its slider.
+TEST(StiffeningChoice, SeesWhatMovesAJointThatNothingElseMoves) {
+  std::string free = dropped("stiffness = 1e5");
+  free.replace(free.find("start_rate"), std::string::npos, "");
+  EXPECT_TRUE(is_on(free));
+  EXPECT_TRUE(is_on(free + "[integrator]\nformulation = \"multipliers\"\n"));
+}
+
 TEST(StiffeningChoice, BeginsWithItWhereStopsAreRigid) { EXPECT_TRUE(is_on(dropped("restitution = 0.8"))); }
 
 }  // namespace
