@@ -134,10 +134,10 @@ equations::Inertia<T> second_order_body(const Link& link, const Vec3<T>& w, cons
       s.Ct[k] += slope[k] * Ct;
       modes.Cr[k] += slope[k] * Cr;
       modes.b[k] += slope[k] * force - Me[k] * s.Q_ddot[a];
-      const T whole = Me[k] + m * slope[k], half = slope[k];
+      const T with_all = Me[k] + m * slope[k], with_own = slope[k];
       T* const Me_k = s.Me.data() + k * n;
 #pragma GCC ivdep
-      for (size_t l = 0; l <= k; ++l) Me_k[l] += whole * slope[l] + half * Me[l];
+      for (size_t l = 0; l <= k; ++l) Me_k[l] += with_all * slope[l] + with_own * Me[l];
     }
   }
   for (size_t k = 0; k < n; ++k)

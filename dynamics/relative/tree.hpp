@@ -57,7 +57,7 @@ struct PlaceMotionInSpace {
 /// Size of the geometric stiffness of a body against its Ke in some state, and of the displacement u2 that goes with
 /// it. 0 where the body has no Kg.
 struct StiffeningEffect {
-  double size = 0;        // the largest |eigenvalue| of Kg(omega, a, alpha, joint forces) in the metric of Ke
+  double size = 0;        // the largest |eigenvalue| of Kg(omega, a, alpha, q_ddot, loads) in the metric of Ke
   double softening = 0;   // what it takes from Ke: at 1 a shape has no stiffness left
   double shortening = 0;  // the largest u2 of a marker that loads may act on [m]
 };
