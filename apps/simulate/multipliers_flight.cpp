@@ -2,6 +2,7 @@
 
 #include "apps/simulate/multipliers_flight.hpp"
 
+#include "apps/simulate/stiffening_choice.hpp"
 #include "apps/simulate/tree_flight.hpp"
 #include "dynamics/simulation/formulations.hpp"
 #include "fem/base/stopwatch.hpp"
@@ -253,11 +254,11 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
   Multibody all = make_multibody(scene, bodies);
   const Scene open = without_loops(scene);
   const Multibody opened = make_multibody(open, bodies);
-  std::vector<Stiffening> stiffening = first_stiffening(open, all, Tree(opened));
   Run r;
   r.bodies = std::move(bodies);
   IntegratorOptions options = integrator_options(scene, hooks, "ida", max_steps);
   set_corners(scene, options);
+  std::vector<Stiffening> stiffening = first_stiffening(open, all, Tree(opened), options.telling_times);
   if (!options.step_ends.empty()) end_steps_at_outputs(options);
   if (scene.from) options.stops = scene.from->stops(joint_names(scene));
   r.prepare_seconds = start.seconds();

@@ -5,6 +5,7 @@
 #include "apps/scene/scene_keys.hpp"
 #include "apps/scene/scene_orbit.hpp"
 #include "apps/simulate/drives.hpp"
+#include "apps/simulate/stiffening_choice.hpp"
 #include "dynamics/model/time_function.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
@@ -15,7 +16,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <utility>
 
@@ -281,38 +281,13 @@ void set_corners(const Scene& scene, IntegratorOptions& o) {
 
 namespace {
 
-bool has_stiffening(const ReducedBody& b) { return b.n() > 0 && !b.Kg.spin.empty(); }
-
-/// Per body: does it lie between the two ends of a spring or of a joint that closes a loop? Such an end holds the body
-/// from getting shorter where it bends. So no load tells of its geometric stiffness before that is in the equations.
-std::vector<char> held_at_both_ends(const Multibody& bodies) {
-  std::vector<int> parent(bodies.bodies.size(), -1);
-  for (const Joint& j : bodies.joints)
-    if (!j.closes_loop) parent[static_cast<size_t>(j.b.body)] = j.a.body;
-  std::vector<char> held(bodies.bodies.size(), 0);
-  const auto hold_between = [&](int a, int b) {
-    std::vector<int> above;  // a and what carries it
-    for (; a >= 0; a = parent[static_cast<size_t>(a)]) above.push_back(a);
-    for (; b >= 0; b = parent[static_cast<size_t>(b)]) {
-      held[static_cast<size_t>(b)] = 1;
-      const auto common = std::ranges::find(above, b);
-      if (common == above.end()) continue;
-      above.erase(common, above.end());
-      break;
-    }
-    for (const int body : above) held[static_cast<size_t>(body)] = 1;
-  };
-  for (const Joint& j : bodies.joints)
-    if (j.closes_loop) hold_between(j.a.body, j.b.body);
-  for (const SpringDamper& s : bodies.springs) hold_between(s.a.body, s.b.body);
-  return held;
-}
-
-/// A blow of a rigid stop is in no look: it has no duration.
-bool has_blows(const Multibody& bodies) {
-  return std::ranges::any_of(bodies.joints, [](const Joint& j) {
-    const auto is_rigid = [](const std::optional<StopLaw>& stop) { return stop && stop->restitution; };
-    return is_rigid(j.law.upper_stop) || is_rigid(j.law.lower_stop);
+/// Over a flight.
+double least_motion(const Tree& tree, const std::vector<VectorXd>& y) {
+  return least_motion(tree.scene(), [&](size_t joint) {
+    const int scalar = tree.layout().joints[joint].scalar;
+    const auto [lowest, highest] =
+        std::ranges::minmax_element(y, {}, [scalar](const VectorXd& row) { return row[scalar]; });
+    return std::pair((*lowest)[scalar], (*highest)[scalar]);
   });
 }
 
@@ -326,87 +301,6 @@ void set_flown(const Scene& scene, TreeTrajectory flight, Run& r) {
 }
 
 }  // namespace
-
-std::vector<Stiffening> first_stiffening(const Scene& scene, const Multibody& whole, const Tree& plain) {
-  const Multibody& bodies = plain.scene();
-  std::vector<Stiffening> none(bodies.bodies.size(), Stiffening::off);
-  if (std::ranges::none_of(bodies.bodies, has_stiffening)) return none;
-  const std::vector<Drive> drives = drives_of(scene);
-  const std::vector<double> times = times_of_extremes(drives, scene.duration, samples_of(scene, drives));
-  std::vector<Stiffening> choice =
-      stiffening_where_it_counts(plain, first_state(scene, plain), scene.duration, scene.tolerance, times);
-  std::vector<char> held = held_at_both_ends(whole);
-  if (has_blows(whole)) held.assign(held.size(), 1);
-  for (size_t i = 0; i < choice.size(); ++i) {
-    if (held[i]) choice[i] = Stiffening::on;
-    if (scene.bodies[i].stiffening == "on" && bodies.bodies[i].n() > 0) choice[i] = Stiffening::on;
-    if (scene.bodies[i].stiffening == "off" || !has_stiffening(bodies.bodies[i])) choice[i] = Stiffening::off;
-  }
-  return choice;
-}
-
-double least_motion(const Multibody& bodies, const std::function<std::pair<double, double>(size_t joint)>& range) {
-  double least = std::numeric_limits<double>::infinity();
-  for (size_t i = 0; i < bodies.joints.size(); ++i) {
-    const Joint& j = bodies.joints[i];
-    const bool is_free = j.kind == JointKind::hinge || j.kind == JointKind::slider;
-    if (!is_free || !j.prescribed.empty() || j.closes_loop) continue;
-    const ReducedBody& carried = bodies.bodies[static_cast<size_t>(j.b.body)];
-    const double length = std::sqrt(carried.J0.trace() / carried.m);
-    constexpr double round_off = 1e-12;  // of the length
-    const auto [lowest, highest] = range(i);
-    const double way = (highest - lowest) * (j.kind == JointKind::hinge ? length : 1);
-    least = std::min(least, std::max(way, round_off * length));
-  }
-  return least;
-}
-
-namespace {
-
-/// Over a flight.
-double least_motion(const Tree& tree, const std::vector<VectorXd>& y) {
-  return least_motion(tree.scene(), [&](size_t joint) {
-    const int scalar = tree.layout().joints[joint].scalar;
-    const auto [lowest, highest] =
-        std::ranges::minmax_element(y, {}, [scalar](const VectorXd& row) { return row[scalar]; });
-    return std::pair((*lowest)[scalar], (*highest)[scalar]);
-  });
-}
-
-}  // namespace
-
-bool revise_stiffening(const Scene& scene, const Multibody& bodies, const std::vector<LargestStiffening>& effect,
-                       std::vector<Stiffening>& choice, double least_motion) {
-  bool changed = false;
-  for (size_t i = 0; i < choice.size(); ++i) {
-    const bool changes =
-        change_without_stiffening(bodies.bodies[i], effect[i].size, scene.duration) > scene.tolerance ||
-        effect[i].shortening > scene.tolerance * least_motion;
-    const bool wanted = scene.bodies[i].stiffening == "auto" && has_stiffening(bodies.bodies[i]) && changes;
-    if (!wanted || choice[i] == Stiffening::on) continue;
-    choice[i] = Stiffening::on;
-    changed = true;
-  }
-  return changed;
-}
-
-bool will_be_revised(const Scene& scene, const Multibody& bodies, const std::vector<LargestStiffening>& effect,
-                     std::vector<Stiffening> choice) {
-  return revise_stiffening(scene, bodies, effect, choice);
-}
-
-void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<LargestStiffening>& effect,
-                       std::vector<Stiffening>& choice, const std::function<Flown()>& fly) {
-  for (bool again = true; again;) {
-    effect.assign(choice.size(), {});
-    try {
-      const Flown flown = fly();
-      again = !flown.interrupted && revise_stiffening(scene, bodies, effect, choice, flown.least_motion);
-    } catch (const NumericalError&) {
-      if (!revise_stiffening(scene, bodies, effect, choice)) throw;
-    }
-  }
-}
 
 namespace {
 
@@ -429,7 +323,10 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   const Stopwatch start;
   const Multibody multibody = make_multibody(scene, bodies);
   const auto plain = std::make_shared<const Tree>(multibody);
-  std::vector<Stiffening> stiffening = first_stiffening(scene, multibody, *plain);
+  IntegratorOptions options = integrator_options(scene, hooks, "auto", max_steps);
+  set_corners(scene, options);
+  if (scene.from) options.stops = scene.from->stops(joint_names(scene));
+  std::vector<Stiffening> stiffening = first_stiffening(scene, multibody, *plain, options.telling_times);
   Run r;
   r.bodies = std::move(bodies);
   r.prepare_seconds = start.seconds();
@@ -460,9 +357,6 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
     told = 0;
     const bool is_plain = std::ranges::count(stiffening, Stiffening::on) == 0;
     r.tree = is_plain ? plain : std::make_shared<const Tree>(multibody, stiffening);
-    IntegratorOptions options = integrator_options(scene, hooks, "auto", max_steps);
-    set_corners(scene, options);
-    if (scene.from) options.stops = scene.from->stops(joint_names(scene));
     flight = integrate(*r.tree, first_state(scene, *r.tree), options, checkpoint, look);
     return Flown{flight.summary.interrupted, least_motion(*r.tree, flight.y)};
   };

@@ -1,6 +1,7 @@
 #include "dynamics/model/second_order_shapes.hpp"
 
 #include "fem/base/check.hpp"
+#include "reduction/body/geometric_stiffness_loads.hpp"
 #include "reduction/invariants/geometric_stiffness.hpp"
 
 #include <fmt/format.h>
@@ -67,8 +68,6 @@ std::vector<Vector4d> affine_functions(const Eigen::Matrix4d& gram) {
   }
   return functions;
 }
-
-constexpr std::array<std::array<Index, 2>, 6> spin_products = {{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}}};
 
 /// Integral of rho (1, u0) u2^T, 4 x 3: its coefficient of q_k q_l.
 Eigen::Matrix<double, 4, 3> second_order_moment(const GeometricStiffness& Kg, Index k, Index l) {
@@ -141,7 +140,7 @@ MatrixXd modal_stiffness(const ReducedBody& b, const VectorXd& q_ddot) {
   const Vector3d alpha =
       0.5 * Vector3d(slope(2, 1) - slope(1, 2), slope(0, 2) - slope(2, 0), slope(1, 0) - slope(0, 1));
   MatrixXd K = motion_stiffness(b, Vector3d::Zero(), field.row(0).transpose(), alpha);
-  for (size_t c = 0; c < 6; ++c) K += products(spin_products[c][0], spin_products[c][1]) * b.Kg.spin[c];
+  for (size_t c = 0; c < 6; ++c) K += products(spin_products[c].first, spin_products[c].second) * b.Kg.spin[c];
   return K;
 }
 

@@ -276,9 +276,10 @@ class TreeFlight final : public Flight<TreeTrajectory> {
 /// Let go, or after a blow, the root of a body with many modes flies off for an instant as if it carried nothing. What
 /// presses a body no longer than that does not buckle it.
 void observe(const std::vector<StiffeningEffect>& effect, double t, std::vector<LargestStiffening>& largest) {
+  observe_size(effect, largest);
   for (size_t b = 0; b < effect.size(); ++b) {
     LargestStiffening& l = largest[b];
-    l.size = std::max(l.size, effect[b].size), l.shortening = std::max(l.shortening, effect[b].shortening);
+    l.shortening = std::max(l.shortening, effect[b].shortening);
     const double lasting = std::min(effect[b].softening, std::exchange(l.last_softening, effect[b].softening));
     if (lasting > l.softening) l.softening = lasting, l.time = t;
   }
