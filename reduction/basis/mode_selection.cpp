@@ -2,7 +2,6 @@
 
 #include "fem/base/check.hpp"
 #include "reduction/basis/interface_nodes.hpp"
-#include "reduction/body/tilde.hpp"
 
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
@@ -19,7 +18,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// The largest shares first until their sum reaches what is wanted; false: it does not.
 bool take_largest(const VectorXd& share, double wanted, std::set<int>& taken) {
@@ -40,18 +38,6 @@ void require_fraction(double fraction) {
 }
 
 }  // namespace
-
-MatrixXd rigid_coupling(const ReducedBody& body) {
-  MatrixXd L(6, body.n());
-  L << body.Ct, body.Cr0;
-  return L;
-}
-
-Matrix6d rigid_mass(const ReducedBody& body) {
-  Matrix6d M_r;
-  M_r << body.m * Eigen::Matrix3d::Identity(), -tilde(body.mc0), tilde(body.mc0), body.J0;
-  return M_r;
-}
 
 std::vector<int> modes_in_band(const ReducedBody& body, double low_hz, double high_hz) {
   require(low_hz <= high_hz, fmt::format("modes: the band from {} Hz to {} Hz is empty", low_hz, high_hz));

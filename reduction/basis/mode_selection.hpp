@@ -1,7 +1,7 @@
 #pragma once
 
 #include "reduction/basis/modal_basis.hpp"
-#include "reduction/body/reduced_body.hpp"
+#include "reduction/body/rigid_motion.hpp"
 
 #include <Eigen/Core>
 
@@ -27,11 +27,6 @@ ReducedBody combined(const ReducedBody&, const Eigen::MatrixXd& T, std::vector<C
 /// them. An interface that loses a coordinate has none any more. The certificate is dropped.
 /// @throws InputError for an index that does not exist, and when the body has no `gram`.
 ReducedBody selected(const ReducedBody&, const std::vector<int>& list);
-
-/// Mass matrix of the rigid motions about the BRF origin, and L = [Ct; Cr0] (6 x n) that couples the coordinates with
-/// them.
-Eigen::Matrix<double, 6, 6> rigid_mass(const ReducedBody&);
-Eigen::MatrixXd rigid_coupling(const ReducedBody&);
 
 /// Part of every coordinate in the rigid inertia of the body, 6 x n: L_k^2 / Me_kk with L = (Ct, Cr0): mass along x y z
 /// [kg], inertia about x y z through the BRF origin [kg m^2]. Summed over all modes of a clamped body they are m and

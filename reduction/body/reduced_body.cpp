@@ -3,6 +3,7 @@
 #include "fem/base/check.hpp"
 #include "fem/base/round_off.hpp"
 #include "reduction/body/diagonal.hpp"
+#include "reduction/body/rigid_motion.hpp"
 #include "reduction/body/tilde.hpp"
 
 #include <fmt/format.h>
@@ -240,11 +241,8 @@ namespace {
 /// Nothing damps them.
 Eigen::MatrixXd rigid_part_of_Me(const ReducedBody& body) {
   if (body.frame != "free") return Eigen::MatrixXd::Zero(body.n(), body.n());
-  Eigen::MatrixXd L(6, body.n());
-  L << body.Ct, body.Cr0;
-  Eigen::MatrixXd M_r(6, 6);
-  M_r << body.m * Eigen::Matrix3d::Identity(), -tilde(body.mc0), tilde(body.mc0), body.J0;
-  const Eigen::MatrixXd part = L.transpose() * M_r.completeOrthogonalDecomposition().solve(L);
+  const Eigen::MatrixXd L = rigid_coupling(body);
+  const Eigen::MatrixXd part = L.transpose() * rigid_mass(body).completeOrthogonalDecomposition().solve(L);
   return 0.5 * (part + part.transpose());
 }
 

@@ -3,6 +3,7 @@
 #include "fem/base/check.hpp"
 #include "fem/base/files.hpp"
 #include "fem/base/text_reader.hpp"
+#include "reduction/body/rigid_motion.hpp"
 #include "reduction/exports/integrals.hpp"
 
 #include <fmt/format.h>
@@ -49,15 +50,6 @@ Eigen::VectorXd vector(const Json& json, Index n) {
   Eigen::VectorXd v(n);
   for (Index i = 0; i < n; ++i) v(i) = json.at(static_cast<size_t>(i)).get<double>();
   return v;
-}
-
-/// M_r: mass, first moment and inertia about the origin as one 6 x 6 matrix.
-MatrixXd rigid_mass(double m, const Eigen::Vector3d& mc0, const Eigen::Matrix3d& J0) {
-  Eigen::Matrix3d tilde;
-  tilde << 0, -mc0.z(), mc0.y(), mc0.z(), 0, -mc0.x(), -mc0.y(), mc0.x(), 0;
-  MatrixXd M(6, 6);
-  M << m * Eigen::Matrix3d::Identity(), -tilde, tilde, J0;
-  return M;
 }
 
 Json json_of(const CouplingFile& file) {
@@ -153,7 +145,7 @@ CouplingFile coupling_file(const ReducedBody& body) {
   }
   file.L_P.resize(6, n);
   file.L_P << body.Ct * modal.T, body.Cr0 * modal.T;
-  file.residual = rigid_mass(body.m, body.mc0, body.J0) - file.L_P * file.L_P.transpose();
+  file.residual = rigid_mass(body) - file.L_P * file.L_P.transpose();
   for (const Marker& m : body.markers) file.markers.push_back({m.name, m.position, m.S * modal.T, m.S_theta * modal.T});
   return file;
 }
