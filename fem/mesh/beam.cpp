@@ -302,12 +302,14 @@ void mass_points(const Mesh& mesh, const Element& element, int extra, const Mass
     const double s = (1 + rule.points(g)) / 2;
     const Section section = section_at(property, s);
     const double dm = property.material.rho * section.A * rule.weights(g) * frame.length / 2;
+    const double on_axis = property.line_mass * rule.weights(g) * frame.length / 2;
     const Matrix6X motion = motion_rows(frame, element.order, has_shear(property), rule.points(g));
     const Vector3d centre = frame.origin + s * frame.length * frame.A_ME.col(0);
     if (!property.rotary_inertia) {
-      visit(dm, centre, motion.topRows<3>());
+      visit(dm + on_axis, centre, motion.topRows<3>());
       continue;
     }
+    if (on_axis > 0) visit(on_axis, centre, motion.topRows<3>());
     // u = u_c + theta x r with r = (0, +-sqrt(Iz/A), +-sqrt(Iy/A)) in element axes.
     const double y = std::sqrt(section.Iz / section.A), z = std::sqrt(section.Iy / section.A);
     for (const Vector3d& r_E : {Vector3d(0, y, z), Vector3d(0, -y, -z), Vector3d(0, y, -z), Vector3d(0, -y, z)}) {

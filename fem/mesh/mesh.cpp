@@ -131,6 +131,8 @@ void validate_properties(const Mesh& mesh) {
     within(fmt::format("beam_properties[{}]", i), [&] {
       const BeamProperty& property = mesh.beam_properties[i];
       property.material.validate_of_beam();
+      require(std::isfinite(property.line_mass) && property.line_mass >= 0,
+              fmt::format("line_mass is {} kg/m; it must be zero or positive", property.line_mass));
       validate_sections(property.start, property.end, property.material, property.theory, property.shear);
     });
   }

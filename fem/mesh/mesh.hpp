@@ -22,6 +22,7 @@ struct BeamProperty {
   ShearRule shear;
   bool rotary_inertia = true;
   Eigen::Vector3d y_axis = Eigen::Vector3d::UnitY();  // direction of the section's y axis, normal to the beam
+  double line_mass = 0;                               // on the axis, beside that of the material [kg/m]
 };
 
 /// What a solid element needs beside its nodes. A mesh file without materials leaves E = 0 until one is given.

@@ -56,6 +56,7 @@ void add_properties(MeshDigest& digest, const Mesh& mesh) {
     digest.add_text(p.shear.name);
     digest.add(p.shear.value);
     digest.add(p.rotary_inertia);
+    digest.add(p.line_mass);
     digest.add_all(p.y_axis.data(), 3);
   }
   digest.add(mesh.solid_properties.size());

@@ -97,8 +97,9 @@ bool uniform(const Mesh& mesh, const BeamProperty& p, const Section& s) {
   return std::ranges::all_of(mesh.elements, [&](const Element& e) {
     const BeamProperty& q = mesh.beam_properties[static_cast<size_t>(e.property)];
     return q.theory == p.theory && q.rotary_inertia == p.rotary_inertia && q.material.E == p.material.E &&
-           q.material.nu == p.material.nu && q.material.rho == p.material.rho && (q.y_axis - p.y_axis).norm() < 1e-12 &&
-           same(section_of(q.start, q.material.nu, q.shear), s) && same(section_of(q.end, q.material.nu, q.shear), s);
+           q.material.nu == p.material.nu && q.material.rho == p.material.rho && q.line_mass == p.line_mass &&
+           (q.y_axis - p.y_axis).norm() < 1e-12 && same(section_of(q.start, q.material.nu, q.shear), s) &&
+           same(section_of(q.end, q.material.nu, q.shear), s);
   });
 }
 
@@ -148,10 +149,11 @@ std::optional<ExactMode> exact_mode(const Found& f, const Vector3d& root, const 
                                     double near) {
   const Section& s = f.section;
   const Material& material = f.property.material;
+  const double rho_A = material.rho * s.A + f.property.line_mass;
   const double along = u.dot(f.axis), twist = theta.dot(f.axis) * f.L, across = (u - along * f.axis).norm();
   if (std::abs(along) > std::max(across, std::abs(twist))) {
-    const auto [omega, integral] = standing_wave(f.L, std::sqrt(material.E / material.rho), near);
-    const Vector3d Ct = material.rho * s.A * integral * along * f.axis;
+    const auto [omega, integral] = standing_wave(f.L, std::sqrt(material.E * s.A / rho_A), near);
+    const Vector3d Ct = rho_A * integral * along * f.axis;
     return ExactMode{omega, Ct, root.cross(Ct)};
   }
   const double Ip = s.Iy + s.Iz;
@@ -168,7 +170,7 @@ std::optional<ExactMode> exact_mode(const Found& f, const Vector3d& root, const 
   const double I = plane_y ? s.Iz : s.Iy, kappa = plane_y ? s.kappa_y : s.kappa_z;
   const bool sheared = f.property.theory == BeamTheory::timoshenko;
   const std::optional<BendingMode> mode =
-      bending_mode({f.L, material.rho * s.A, material.E * I, f.property.rotary_inertia ? material.rho * I : 0,
+      bending_mode({f.L, rho_A, material.E * I, f.property.rotary_inertia ? material.rho * I : 0,
                     sheared ? 1 / (kappa * material.shear_modulus() * s.A) : 0},
                    near);
   if (!mode) return {};

@@ -18,6 +18,7 @@ Mesh with_everything(const ElementType& row, int order) {
   NodalBody body{1, 2.5, Eigen::Vector3d(3, 4, 5).asDiagonal(), {0.1, 0.2, 1.0 / 3}};
   body.inertia(0, 1) = body.inertia(1, 0) = 0.25;
   mesh.bodies = {body};
+  if (row.shape == Shape::line) mesh.beam_properties[1].line_mass = 0.25;
   for (Eigen::Index i = 0; i < mesh.nodes.cols(); ++i) mesh.node_labels.push_back(100 + 3 * i);
   mesh.element_labels = {7, 123456789012};
   return mesh;
@@ -33,6 +34,7 @@ void expect_same_beams(const Mesh& mesh, const Mesh& expected) {
     EXPECT_EQ(a.shear.value, b.shear.value);
     EXPECT_EQ(a.rotary_inertia, b.rotary_inertia);
     EXPECT_EQ(a.y_axis, b.y_axis);
+    EXPECT_EQ(a.line_mass, b.line_mass);
     for (const auto& [x, y] : {std::pair{a.start, b.start}, {a.end, b.end}}) {
       ASSERT_EQ(x.index(), y.index());
       const Section s = section_of(x, 0.3, {}), t = section_of(y, 0.3, {});

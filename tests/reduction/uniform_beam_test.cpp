@@ -87,6 +87,23 @@ TEST(UniformBeam, OfEveryTheoryAgreesWithItsClosedForm) {
   }
 }
 
+// Torsion does not feel what lies on the axis; bending and tension do.
+TEST(UniformBeam, MassOnTheAxisIsPartOfTheClosedForm) {
+  for (const bool rotary : {false, true}) {
+    const Mesh bare = make_mesh(boom4(BeamTheory::timoshenko, rotary, 8, 8));
+    Mesh mesh = bare;
+    const double rho_A = mesh.beam_properties[0].material.rho * section_of(mesh.beam_properties[0].start, 0.33, {}).A;
+    for (BeamProperty& p : mesh.beam_properties) p.line_mass = 3 * rho_A;
+    const Checked c = checked(mesh, 20), of_bare = checked(bare, 20);
+    for (size_t i = 0; i < 3; ++i) EXPECT_LT(c.checks[i].relative_error, 1e-9) << c.checks[i].name;
+    const auto first = [](const Checked& of, ModeKind kind) {
+      return of.basis.omega[std::ranges::find(of.basis.kind, kind) - of.basis.kind.begin()];
+    };
+    EXPECT_NEAR(first(c, ModeKind::bending_y) / first(of_bare, ModeKind::bending_y), 0.5, 1e-3);
+    if (rotary) EXPECT_NEAR(first(c, ModeKind::torsion), first(of_bare, ModeKind::torsion), 1e-9 * c.basis.omega[19]);
+  }
+}
+
 TEST(UniformBeam, ErrorIsThatOfTheMesh) {
   const Checked coarse = checked(make_mesh(boom4(BeamTheory::timoshenko, true, 2, 2)), 6);
   EXPECT_GT(coarse.checks[0].relative_error, 1e-6);

@@ -250,6 +250,7 @@ void DeckWriter::write_beam_section(size_t i) {
   const BeamProperty& property = mesh_.beam_properties[i];
   const auto where = [i](const char* what) { return fmt::format("beam property {} {}", i, what); };
   require(property.rotary_inertia, where("is without rotary inertia, which B31 always has"));
+  require(property.line_mass == 0, where("has mass on its axis beside that of its material, which no deck holds"));
   require(property.shear.name == ShearRule{}.name, where("has a shear coefficient of its own, which no deck holds"));
   const SectionShape middle = interpolate(property.start, property.end, 0.5);
   if (const auto* bar = std::get_if<RoundBar>(&property.start)) {

@@ -164,11 +164,8 @@ int Elements::beam_property(const BeamLine& line, const BeamPropertyLine& lines,
   property.material = material_of(bulk_, lines.material, lines.at, &MaterialLine::of_bars);
   property.theory = lines.shear ? BeamTheory::timoshenko : BeamTheory::euler_bernoulli;
   property.y_axis = y;
-  if (lines.line_mass != 0) {
-    property.material.rho += lines.line_mass / section_of(lines.shape, property.material.nu, {"value", 1}).A;
-    bulk_.notes.add("nonstructural mass of beams is spread over their section");
-  }
-  if (property.material.rho < 0) bulk_.fail(lines.at, "the nonstructural mass is negative");
+  property.line_mass = lines.line_mass * bulk_.mass_factor;
+  if (property.line_mass < 0) bulk_.fail(lines.at, "the nonstructural mass is negative");
   property.material.rho *= bulk_.mass_factor;
   mesh_.beam_properties.push_back(property);
   return place->second;

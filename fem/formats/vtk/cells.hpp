@@ -41,8 +41,9 @@ inline constexpr std::string_view order = "flexboom:order";        // cells: Ele
 inline constexpr std::string_view label = "flexboom:label";        // points and cells
 inline constexpr std::string_view beam_start = "flexboom:section:start";  // cells: kind of section, six dimensions
 inline constexpr std::string_view beam_end = "flexboom:section:end";
-inline constexpr std::string_view beam = "flexboom:beam";        // cells: y axis, rotary inertia, shear rule, its value
-inline constexpr std::string_view support = "flexboom:support";  // points: components held
+inline constexpr std::string_view beam = "flexboom:beam";  // cells: y axis, rotary inertia, shear rule, its value
+inline constexpr std::string_view line_mass = "flexboom:line-mass";  // cells: of beams, where any has it
+inline constexpr std::string_view support = "flexboom:support";      // points: components held
 inline constexpr std::string_view body = "flexboom:body";  // points: m, Jxx Jyy Jzz Jxy Jxz Jyz, offset to mass centre
 }  // namespace vtk_field
 

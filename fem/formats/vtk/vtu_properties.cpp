@@ -60,7 +60,7 @@ SectionShape section_of_numbers(const Field& field, long cell) {
 }
 
 struct PropertyFields {
-  Field property, material, order, start, end, beam;
+  Field property, material, order, start, end, beam, line_mass;
 
   PropertyFields(const VtuArrays& arrays, long cells)
       : property(arrays, "CellData", vtk_field::property, 1, cells),
@@ -68,7 +68,8 @@ struct PropertyFields {
         order(arrays, "CellData", vtk_field::order, 1, cells),
         start(arrays, "CellData", vtk_field::beam_start, 7, cells),
         end(arrays, "CellData", vtk_field::beam_end, 7, cells),
-        beam(arrays, "CellData", vtk_field::beam, 6, cells) {
+        beam(arrays, "CellData", vtk_field::beam, 6, cells),
+        line_mass(arrays, "CellData", vtk_field::line_mass, 1, cells) {
     if (!material) property.fail(fmt::format("needs the field \"{}\" beside it", vtk_field::material));
     if (beam && (!start || !end || !order)) beam.fail("needs the fields of sections and order beside it");
   }
@@ -84,6 +85,8 @@ BeamProperty beam_property(const PropertyFields& fields, const ElementType& row,
   property.theory = row.name == "beam-timoshenko" ? BeamTheory::timoshenko : BeamTheory::euler_bernoulli;
   property.y_axis = options.head<3>();
   property.rotary_inertia = options(3) != 0;
+  if (fields.line_mass) property.line_mass = fields.line_mass(cell)(0);
+  if (!(property.line_mass >= 0)) fields.line_mass.fail(fmt::format("cell {} is {}", cell, property.line_mass));
   if (!(options(4) >= 0 && options(4) < 3))
     fields.beam.fail(fmt::format("cell {} has no shear rule {}", cell, options(4)));
   property.shear = {rules[static_cast<size_t>(options(4))], options(5)};

@@ -50,6 +50,7 @@ double shear_rule_number(const ShearRule& rule) {
 void add_beam_fields(VtkGrid& grid, const Mesh& mesh) {
   const auto count = static_cast<Index>(mesh.elements.size());
   MatrixXd start = MatrixXd::Zero(7, count), end = start, options = MatrixXd::Zero(6, count);
+  MatrixXd line_mass = MatrixXd::Zero(1, count);
   for (Index e = 0; e < count; ++e) {
     const Element& element = mesh.elements[static_cast<size_t>(e)];
     if (!is_beam(element)) continue;
@@ -58,10 +59,12 @@ void add_beam_fields(VtkGrid& grid, const Mesh& mesh) {
     end.col(e) = numbers_of(property.end);
     options.col(e) << property.y_axis, property.rotary_inertia ? 1 : 0, shear_rule_number(property.shear),
         property.shear.value;
+    line_mass(e) = property.line_mass;
   }
   grid.cell_data.emplace_back(vtk_field::beam_start, std::move(start));
   grid.cell_data.emplace_back(vtk_field::beam_end, std::move(end));
   grid.cell_data.emplace_back(vtk_field::beam, std::move(options));
+  if (!line_mass.isZero(0)) grid.cell_data.emplace_back(vtk_field::line_mass, std::move(line_mass));
 }
 
 void add_properties(VtkGrid& grid, const Mesh& mesh) {
