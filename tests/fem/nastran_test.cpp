@@ -112,6 +112,11 @@ TEST(Nastran, CaseControlSelectsSupportsAndModes) {
   EXPECT_EQ(held(only.mesh, 2), "1");
   EXPECT_EQ(only.modes, 7);
   EXPECT_TRUE(has_note(only, "the only set, 4, is used"));
+  // Nastran leaves out what a case control does not select.
+  for (const char* sets : {"SPC1,2,123,1\n", "MPC,2,1,1,1.,2,1,1.\n"}) {
+    const std::string message = input_error([&] { read("SOL 103\nCEND\nMETHOD=1\nBEGIN BULK\n" + small + sets); });
+    EXPECT_NE(message.find("sets 2, and without that Nastran leaves them out"), std::string::npos) << message;
+  }
 }
 
 TEST(Nastran, PermanentSupportsAndDefaultsOfGrids) {
@@ -173,6 +178,8 @@ TEST(Nastran, BarsAndTheirPlanes) {
   EXPECT_EQ(section_of(node.beam_properties[0].start, 0.3, {}).kappa_y, 0.8);
   EXPECT_EQ(node.beam_properties[0].y_axis, Vector3d::UnitY());
   EXPECT_NEAR(total_mass(node), 160 + 20, 1e-10);
+  EXPECT_EQ(node.beam_properties[0].material.rho, 8000);  // it turns with nothing: torsion knows nothing of it
+  EXPECT_EQ(node.beam_properties[0].line_mass, 10);
   EXPECT_EQ(node.nodes.cols(), 2);
 }
 

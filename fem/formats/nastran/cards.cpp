@@ -87,6 +87,7 @@ void Cards::read_case_control(std::string_view text) {
       include(stripped);
       continue;
     }
+    case_.given = case_.given || key == "CEND";
     case_line(stripped);
   }
 }

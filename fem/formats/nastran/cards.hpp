@@ -23,6 +23,7 @@ struct Card {
 
 /// What the executive and case control say that matters to modes.
 struct CaseControl {
+  bool given = false;                    // is there any?
   std::optional<long> spc, mpc, method;  // of the first subcase that has one
   bool other_spc = false;                // a later subcase has another
   std::string_view spc_at, mpc_at, method_at;

@@ -123,14 +123,18 @@ std::vector<long> Connections::selected(std::string_view kind, const std::option
     std::set<long> ids;
     for (const auto& [id, lines] : sets) ids.insert(id);
     if (ids.empty()) return {};
+    if (bulk_.cards.case_control().given)
+      bulk_.fail({}, fmt::format("the case control selects none of the {0} sets {1}, and without that Nastran leaves "
+                                 "them out; add {0} = n to it, or take them out",
+                                 kind, fmt::join(ids, ", ")));
     if (sums.size() == 1) {
-      bulk_.notes.add(fmt::format("the case control selects no {}; {}ADD {} is used", kind, kind, sums.begin()->first));
+      bulk_.notes.add(fmt::format("no case control selects an {}; {}ADD {} is used", kind, kind, sums.begin()->first));
       return selected(kind, sums.begin()->first, sets, sums);
     }
     if (ids.size() > 1 || !sums.empty())
-      bulk_.fail({}, fmt::format("the case control selects none of the {} sets {}; add {} = n to it", kind,
+      bulk_.fail({}, fmt::format("no case control says which of the {} sets {} count; add one with {} = n", kind,
                                  fmt::join(ids, ", "), kind));
-    bulk_.notes.add(fmt::format("the case control selects no {}; the only set, {}, is used", kind, *ids.begin()));
+    bulk_.notes.add(fmt::format("no case control selects an {}; the only set, {}, is used", kind, *ids.begin()));
     return {*ids.begin()};
   }
   const auto sum = sums.find(*wanted);
