@@ -240,6 +240,8 @@ struct CommandLine {
     c->add_option("SCENE", bench.scenes, "Of transient: scenes instead of its own four");
     c->add_option("--longest", bench.longest, "Leave out models that would take longer than this [s]");
     c->callback([this] {
+      require_usage(bench.what == "transient" || bench.scenes.empty(),
+                    fmt::format("bench {} has models of its own; only transient takes scenes", bench.what));
       const auto command = bench.what == "modes"       ? bench_modes_command
                            : bench.what == "reduction" ? bench_reduction_command
                                                        : bench_transient_command;

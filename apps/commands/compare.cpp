@@ -115,7 +115,7 @@ int compare_command(const CompareArguments& a, const CommonOptions& common) {
     if (!transients.empty()) print_transients(transients);
   }
   if (passed) return exit_ok;
-  if (!common.quiet) print_note(fmt::format("order 8 is outside the tolerance {:g}", a.tolerance));
+  if (!common.quiet) print_note(fmt::format("the highest order is outside the tolerance {:g}", a.tolerance));
   return exit_check_failed;
 }
 

@@ -100,13 +100,36 @@ void override_modes(Scene& scene, const std::string& text) {
   }
 }
 
+/// Keys of a body that say something else than a plan, whose values replace them: beside its modes.
+std::vector<std::string_view> replaced_keys(const BodyScene& b, const BodyScene& planned) {
+  std::vector<std::string_view> keys;
+  if (b.directions_given && b.directions != planned.directions) keys.emplace_back("directions");
+  if (!b.basis.corrections.empty() && b.basis.corrections != planned.basis.corrections)
+    keys.emplace_back("corrections");
+  if (const int usual = BeamGeometry{}.order; b.geometry.order != usual && b.geometry.order != planned.geometry.order)
+    keys.emplace_back("order");
+  return keys;
+}
+
+/// The modes, elements and stiffening of a plan, but for a stiffening that the body is given.
+void take_model(BodyScene& b, const BodyScene& planned) {
+  b.modes = planned.modes, b.shapes = planned.shapes, b.directions = planned.directions;
+  b.modes_auto = planned.modes_auto, b.directions_given = planned.directions_given;
+  b.basis.corrections = planned.basis.corrections;
+  b.solid = planned.solid, b.geometry.order = planned.geometry.order;
+  if (b.stiffening == "auto") b.stiffening = planned.stiffening;
+  if (b.geometry.segments.size() != planned.geometry.segments.size()) return;
+  for (size_t i = 0; i < b.geometry.segments.size(); ++i)
+    b.geometry.segments[i].elements = planned.geometry.segments[i].elements;
+}
+
 /// Bodies get the modes, elements and stiffening that they have in another scene of the same bodies. The integrator
 /// gets the tolerance that it has there.
 void take_plan(Scene& scene, const std::filesystem::path& from) {
   const Scene planned = load_scene((std::filesystem::is_directory(from) ? from / "scene.toml" : from).string());
   if (planned.step_tolerance() < scene.tolerance) scene.integrator_tolerance = planned.step_tolerance();
   for (BodyScene& b : scene.bodies) {
-    if (!b.is_boom()) continue;
+    if (!b.is_boom() || b.structure == "rigid") continue;  // what is said to be rigid takes no modes
     const auto p = std::ranges::find(planned.bodies, b.name, &BodyScene::name);
     if (p == planned.bodies.end() || !p->is_boom()) {
       std::vector<std::string_view> names;
@@ -115,12 +138,20 @@ void take_plan(Scene& scene, const std::filesystem::path& from) {
       throw InputError(fmt::format("--plan: {} has no boom \"{}\"; {}it has \"{}\"", from.string(), b.name,
                                    toml_reader::question(b.name, names), fmt::join(names, "\", \"")));
     }
-    b.structure = p->structure, b.stiffening = p->stiffening, b.solid = p->solid, b.geometry.order = p->geometry.order;
-    b.modes = p->modes, b.shapes = p->shapes, b.directions = p->directions;
-    b.basis.corrections = p->basis.corrections;
-    b.modes_auto = p->modes_auto, b.directions_given = p->directions_given;
-    BodyScene same = *p;
-    same.damping = b.damping;
+    require(
+        b.basis.name == p->basis.name,
+        fmt::format("--plan: body {} has the basis \"{}\" here and \"{}\" in {}, whose modes are others; drop --plan",
+                    b.name, b.basis.name, p->basis.name, from.string()));
+    require(
+        p->structure != "rigid",
+        fmt::format("--plan: body {} is rigid in {}, which has no modes for it; drop --plan", b.name, from.string()));
+    const std::vector<std::string_view> replaced = replaced_keys(b, *p);
+    if (!replaced.empty())
+      scene.warnings.push_back(fmt::format("--plan: body {} has {} as in {}, not as the scene says", b.name,
+                                           fmt::join(replaced, ", "), from.string()));
+    take_model(b, *p);
+    BodyScene same = *p;  // but for what changes no mode
+    same.damping = b.damping, same.backend = b.backend, same.stiffening = b.stiffening;
     if (to_toml(same) != to_toml(b))
       scene.warnings.push_back(fmt::format(
           "--plan: body {} is another one in {}: its modes are chosen by their places in the order of frequencies, "

@@ -123,7 +123,9 @@ std::vector<double> times_of_extremes(const std::vector<Drive>& drives, double d
     const Reals corners = corners_of(d, duration, samples);
     Reals looks;  // between corners a pulse may be shorter than the samples
     for (int i = 0; i <= samples; ++i) looks.push_back(duration * i / samples);
-    for (size_t i = 1; i < corners.size(); ++i) looks.push_back(0.5 * (corners[i - 1] + corners[i]));
+    const auto in_flight = [duration](double t) { return std::clamp(t, 0.0, duration); };
+    for (size_t i = 1; i < corners.size(); ++i)
+      looks.push_back(0.5 * (in_flight(corners[i - 1]) + in_flight(corners[i])));
     Reals values;
     for (const double t : looks) values.push_back(d.felt()(t));
     const auto [least, most] = std::ranges::minmax_element(values);

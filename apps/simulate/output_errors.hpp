@@ -57,6 +57,8 @@ struct OutputDifference {
 /// - the rate that all of the kinetic energy would give the least inertia, 100 rad/s at most;
 /// - the largest output of the same unit.
 ///
+/// An output that stays below 1e-11 of that in both tables is zero, and what is left of it is round-off.
+///
 /// An output with an accuracy of its own (as wanted_output) has the error `tolerance` where it has that accuracy.
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted, const OutputFloors& = {});

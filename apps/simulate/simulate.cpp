@@ -1,6 +1,7 @@
 #include "apps/simulate/simulate.hpp"
 
 #include "apps/base/deflection.hpp"
+#include "apps/model/static_shapes.hpp"
 #include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/field_error.hpp"
 #include "apps/simulate/flights_ahead.hpp"
@@ -19,6 +20,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace flexboom {
 
@@ -169,8 +171,21 @@ void warn_of_the_balance(const IntegrationSummary& s, RunResult& r) {
       fmt::format("{}: more than the {:.1e} that go with the tolerance, so {}", balances(s), allowed, consequence));
 }
 
-/// Modes that bend out of the hinge plane, twist and stretch are left out where the scene says so. A jump of a load
-/// reaches a joint as a wave, and no number of modes has its front.
+/// Node sets of a body where joints, springs and loads act, and for which it has no static shape.
+std::vector<std::string> loaded_without_shapes(const Scene& scene, const BodyScene& b) {
+  std::vector<std::string> places;
+  if (!b.is_boom() || b.structure == "rigid" || b.structure == "eq14" || b.basis.name != "clamped") return places;
+  const auto place_of = [](const std::string& shape) { return shape.substr(0, shape.rfind('.')); };
+  std::set<std::string> shaped;
+  for (const std::string& shape : b.basis.corrections) shaped.insert(place_of(shape));
+  for (const std::string& shape : static_shapes_of_loads(scene, b))
+    if (shaped.insert(place_of(shape)).second) places.push_back(place_of(shape));
+  return places;
+}
+
+/// Modes that bend out of the hinge plane, twist and stretch are left out where the scene says so. What a load bends
+/// where it acts takes many modes, or one static shape. A jump of a load reaches a joint as a wave, and no number of
+/// modes has its front.
 std::string help_with_truncation(const RunResult& r) {
   constexpr double of_fronts = 0.1;
   const OutputErrors* worst = r.budget.worst();
@@ -182,6 +197,12 @@ std::string help_with_truncation(const RunResult& r) {
   if (!names.empty())
     return fmt::format("; {} {} modes of the hinge plane alone, and directions = \"all\" takes the others in",
                        fmt::join(names, ", "), names.size() == 1 ? "has" : "have");
+  for (const BodyScene& b : r.scene.bodies)
+    if (const std::vector<std::string> places = loaded_without_shapes(r.scene, b); !places.empty())
+      return fmt::format(
+          "; body {} has no static shapes of what acts at {}: corrections = [\"{}.Fy\", ...] or modes = "
+          "\"auto\" takes them in",
+          b.name, fmt::join(places, ", "), places.front());
   if (!is_load(worst->name) || !(worst->truncation > of_fronts)) return "";
   return "; where a load or a motion sets in at once, loads of joints follow within the time of a wave through the "
          "body, and no number of modes resolves that: let it rise over some periods of the body, or name other outputs";

@@ -154,11 +154,21 @@ void put_number(Value& value, double number) {
   value.integer = whole ? static_cast<std::int64_t>(number) : 0;
 }
 
+void move_to(const toml_reader::Place& place, Value& value) {
+  value.place = place;
+  for (Value& item : value.items) move_to(place, item);
+  for (toml_reader::Entry& entry : value.entries) move_to(place, entry.second);
+}
+
 void put_variant(Value& value, const KeyVariant& variant) {
   const toml_reader::Place place = value.place;
   value = Value();
   value.place = place;
   if (variant.word.empty()) return put_number(value, variant.number);
+  if (std::string_view("[{\"").find(variant.word.front()) != std::string_view::npos) {  // as a file writes it
+    value = toml_reader::parse("value = " + variant.word, "--vary").entries.front().second;
+    return move_to(place, value);
+  }
   value.boolean = variant.word == "true";
   value.kind = value.boolean || variant.word == "false" ? Value::Kind::boolean : Value::Kind::text;
   value.text = variant.word;

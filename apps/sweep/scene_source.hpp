@@ -10,7 +10,7 @@
 
 namespace flexboom {
 
-/// A value that a key of a scene takes in a run: a number, or a word.
+/// A value that a key of a scene takes in a run: a number, or a word. One in brackets or quotes is read as in a file.
 struct KeyVariant {
   double number = 0;
   std::string word;  // empty: the number counts

@@ -17,14 +17,21 @@ namespace {
 
 constexpr size_t most_runs = 10'000'000;
 
+/// Not inside of brackets or quotes: "min(t,1)" is one part.
 std::vector<std::string> split_at(std::string_view text, char sign) {
-  std::vector<std::string> parts;
-  for (;;) {
-    const size_t end = text.find(sign);
-    parts.emplace_back(text.substr(0, end));
-    if (end == std::string::npos) return parts;
-    text.remove_prefix(end + 1);
+  std::vector<std::string> parts(1);
+  int depth = 0;
+  bool quoted = false;
+  for (const char c : text) {
+    if (c == '"') quoted = !quoted;
+    if (!quoted && std::string_view("([{").find(c) != std::string_view::npos) ++depth;
+    if (!quoted && std::string_view(")]}").find(c) != std::string_view::npos) --depth;
+    if (c == sign && !quoted && depth <= 0)
+      parts.emplace_back();
+    else
+      parts.back() += c;
   }
+  return parts;
 }
 
 double spec_number(const std::string& of, const std::string& text) {

@@ -1206,6 +1206,29 @@ class Plan(Case):
         self.assert_exit(INPUT, result)
         self.assertIn('has no boom "panel"', result.stderr)
 
+    def test_what_a_scene_says_itself_stays_or_is_told(self):
+        planned = self.folder / "planned"
+        self.run_of("planned", "--modes", "auto", "--no-budget")
+        text = (MESHES / "sport.toml").read_text()
+        first_body = text[text.index("[[bodies]]"):].split("\n\n")[0]
+        name = re.search(r'^name = "(\w+)"', first_body, re.M).group(1)
+        for keys, exit_code, told in (
+                ('structure = "rigid"', OK, None), ('backend = "dense"', OK, None),
+                ('order = 2', OK, f"--plan: body {name} has order as in"),
+                ('directions = "hinge-plane"', OK, f"--plan: body {name} has directions as in"),
+                ('basis = "mean-axis"', INPUT, 'has the basis "mean-axis" here and "clamped"')):
+            file = self.folder / "own.toml"
+            file.write_text(text.replace(f'name = "{name}"', f'{keys}\nname = "{name}"', 1))
+            out = self.folder / "own"
+            result = flexboom("run", file, "--duration", "0.01", "--tolerance", "1e-3", "--plan", planned, "--no-budget",
+                              "--out", out)
+            self.assert_exit(exit_code, result)
+            self.assertEqual(re.findall(r"--plan: .*", result.stderr + result.stdout) != [], told is not None, keys)
+            if told is not None:
+                self.assertIn(told, result.stderr + result.stdout)
+            if "rigid" in keys:
+                self.assertNotIn(f"{name}.q1", (out / "trajectory.csv").read_text().split("\n")[0])
+
     def test_a_plan_of_another_body_of_the_name_is_warned_of(self):
         planned = self.folder / "planned"
         self.run_of("planned", "--modes", "auto", "--no-budget")
@@ -1260,6 +1283,7 @@ class Bench(Case):
 
     def test_unknown_bench(self):
         self.assert_exit(USAGE, flexboom("bench", "nonsense"))
+        self.assert_exit(USAGE, flexboom("bench", "modes", "sport"))
 
 
 class Modes(Case):
@@ -1622,6 +1646,17 @@ class Compare(Case):
         self.assertLess(max(orders[-1][k] for k in ("frequency", "Ct", "Cr")), 1e-10)
         self.assertLess(orders[-1]["subspace"], 1e-9)
         self.assertEqual(len(document["bodies"][0]["modes"]), 10)
+
+    def test_more_modes_than_low_orders_have(self):
+        for count, first in (16, 1), (17, 2), (30, 3):
+            result = flexboom("compare", BOOM4, "--json", "--count", str(count), "--tolerance", "1")
+            self.assert_exit(OK, result)
+            body = json.loads(result.stdout)["bodies"][0]
+            orders = [o["order"] for o in body["orders"]]
+            self.assertEqual(orders, list(range(9 - len(orders), 9)))
+            self.assertTrue(first <= orders[0] <= 6, orders)
+            self.assertEqual(len(body["modes"]), count)
+        self.assert_exit(INPUT, flexboom("compare", BOOM4, "--count", "50", "--elements", "1"))
 
     def test_tolerance_that_cannot_be_met(self):
         result = flexboom("compare", BOOM4, "--tolerance", "1e-20", "--json")

@@ -123,5 +123,38 @@ TEST(Orbit, WhatGravityWithinABodyLeavesOutIsInTheBudget) {
   }
 }
 
+// Geometric stiffness is looked at when a drive is largest: not beyond the end, where an orbit with J2 is not known.
+TEST(Orbit, WithJ2ATableGoesOnBeyondTheEnd) {
+  const RunResult r = run_scene(parse_scene(R"(format = "flexboom-scene-1"
+name = "table"
+duration = 0.5
+output_step = 0.1
+accuracy = { tolerance = 1e-3, budget = false }
+orbit = { altitude = 5e5, J2 = true, gravity = "differential" }
+[[bodies]]
+name = "hub"
+mass = 20
+inertia = [1.0, 1.2, 0.9]
+[[bodies]]
+name = "boom"
+segments = [{ shape = "round-bar", diameter = 0.01, length = 1.2, material = { E = 70e9, nu = 0.33, rho = 2700 } }]
+[[joints]]
+kind = "free"
+b = { body = "hub" }
+[[joints]]
+kind = "fixed"
+a = { body = "hub" }
+b = { body = "boom", marker = "root" }
+[[wheels]]
+name = "wheel"
+body = "hub"
+inertia = 0.02
+torque = { time = [0, 0.4, 3, 6], value = [0.02, 0.02, -0.05, 0.0], interpolation = "linear" }
+)",
+                                            "table"),
+                                {});
+  EXPECT_EQ(r.motion.time.back(), 0.5);
+}
+
 }  // namespace
 }  // namespace flexboom

@@ -164,6 +164,23 @@ TEST(SweepValues, GridTurnsItsLastListFastest) {
   EXPECT_NEAR(second[2].number, 10, 1e-14);
 }
 
+TEST(SweepValues, BracketsAndQuotesAreOneValue) {
+  const SweepValues values({.vary = {"a=min(t,1)*2,0.1", "b=[0,0,1],[0,1,0]", R"(c="x,y",z)"}, .n = {}, .sample = ""});
+  ASSERT_EQ(values.runs(), 8U);
+  const std::vector<KeyVariant> first = values.of_run(0), last = values.of_run(7);
+  EXPECT_EQ(first[0].word, "min(t,1)*2");
+  EXPECT_EQ(last[0].number, 0.1);
+  EXPECT_EQ(first[1].word, "[0,0,1]");
+  EXPECT_EQ(last[1].word, "[0,1,0]");
+  EXPECT_EQ(first[2].word, "\"x,y\"");
+  SceneSource source("sport");
+  source.set("initial.rate", first[1]);
+  EXPECT_EQ(source.read().start_rate, Eigen::Vector3d::UnitZ());
+  source.set("name", {0, "\"x_y\""});
+  EXPECT_EQ(source.read().name, "x_y");
+  EXPECT_THROW(source.set("initial.rate", {0, "[0,0"}), InputError);
+}
+
 TEST(SweepValues, IndicesMixTwoPointsOfTheKeysThatVary) {
   const SweepValues values(
       {.vary = {"a=uniform:0:1", "b=5", "c=uniform:0:1"}, .n = 8, .sample = "sobol", .indices = true});
