@@ -116,6 +116,17 @@ void check_eq14(Faults& faults, const std::string& path, const BodyScene& body) 
                            body.modes));
 }
 
+/// Freedoms a clamped mesh has left for bending along y. An element of order p has p internal freedoms of extension and
+/// of torsion, and the rest in halves for the two bending planes.
+int unknowns_in_hinge_plane(const Mesh& mesh, const std::vector<int>& clamp) {
+  int count = 2 * static_cast<int>(mesh.nodes.cols() - std::ssize(clamp));
+  for (const Element& element : mesh.elements) {
+    const int internal = element_types()[static_cast<size_t>(element.type)].internal_freedoms(mesh, element);
+    count += (internal - 2 * element.order) / 2;
+  }
+  return count;
+}
+
 void check_shapes(Faults& faults, const std::string& path, const BodyScene& body) {
   if (body.shapes.empty()) return;
   if (body.modes_auto)
@@ -134,7 +145,7 @@ void check_mode_count(Faults& faults, const std::string& path, const BodyScene& 
   const Mesh mesh = make_mesh(body.geometry);
   const std::vector<int> clamp = node_set(mesh, body.clamp);
   const bool all = body.directions == "all";
-  int limit = freedoms_in_one_plane(mesh, clamp);
+  int limit = unknowns_in_hinge_plane(mesh, clamp);
   if (body.modes <= limit) return;  // which spares the assembly, too
   if (all) limit = unknowns(mesh, assemble(mesh).dofs, clamp).count;
   if (body.modes <= limit) return;

@@ -161,15 +161,4 @@ Mesh make_mesh(const BeamGeometry& boom) {
   return mesh;
 }
 
-/// An element of order p has p internal freedoms of extension and of torsion, and the rest in halves for the two
-/// planes.
-int freedoms_in_one_plane(const Mesh& mesh, const std::vector<int>& clamp) {
-  int count = 2 * static_cast<int>(mesh.nodes.cols() - std::ssize(clamp));
-  for (const Element& element : mesh.elements) {
-    const int internal = element_types()[static_cast<size_t>(element.type)].internal_freedoms(mesh, element);
-    count += (internal - 2 * element.order) / 2;
-  }
-  return count;
-}
-
 }  // namespace flexboom

@@ -54,7 +54,4 @@ struct BeamGeometry {
 /// @throws InputError as BeamGeometry::validate and validate_stations.
 Mesh make_mesh(const BeamGeometry&);
 
-/// Freedoms that a mesh of beams with clamped nodes has left for bending in one plane.
-int freedoms_in_one_plane(const Mesh&, const std::vector<int>& clamp);
-
 }  // namespace flexboom
