@@ -8,6 +8,12 @@ namespace flexboom {
 
 using Eigen::Vector3d;
 
+namespace {
+
+constexpr double on_stop = 4e-16;  // as near as a place is known [rad] or [m]
+
+}  // namespace
+
 std::string_view event_name(const StopEvent& e) {
   constexpr std::array<std::string_view, 10> names = {"",     "kink",   "engage", "disengage", "stick",
                                                       "slip", "impact", "rest",   "leave",     "latch"};
@@ -36,7 +42,8 @@ Contacts::Contacts(std::vector<Stop> stops, const FlightOptions& options, std::s
       armed_(stops_.size(), 0),
       crossed_(stops_.size(), 0),
       approach_(stops_.size()),
-      asleep_(stops_.size(), 0.0) {
+      asleep_(stops_.size(), 0.0),
+      came_back_(stops_.size(), -1) {
   for (std::size_t i = 0; i < size(); ++i) {
     armed_[i] = stops_[i].is_there && history_[stops_[i].joint].settled < 0;
     approach_[i] = Approach(history_[stops_[i].joint].sides);
@@ -44,13 +51,12 @@ Contacts::Contacts(std::vector<Stop> stops, const FlightOptions& options, std::s
 }
 
 void Contacts::begin(StopMotion& motion) {
-  constexpr double round_off = 4e-16;
   const std::vector<char> open(size(), 0);
   for (std::size_t i = 0; i < size(); ++i) {
     const Gap gap = motion.gap(i);
     approach_[i].observe(gap.value, gap.rate, stops_[i].spring_rate);
     if (!armed_[i]) continue;
-    const bool on = std::abs(gap.value) < round_off;
+    const bool on = std::abs(gap.value) < on_stop;
     const bool goes = gap.rate > 0 || (gap.rate == 0 && on && motion.push(i, open).acceleration > 0);
     closed_[i] = history_[stops_[i].joint].closed.value_or(on ? goes : gap.value > 0);
   }
@@ -74,6 +80,8 @@ bool Contacts::update(StopMotion& motion, double t, std::vector<StopEvent>& even
       changed = true;
       if (has_decayed(i, gap, motion)) {
         settle(i, t);
+      } else if (comes_back(i, gap, t, motion)) {
+        motion.put_on_stop(i);
       } else {
         closed_[i] = slipped ? gap.value > 0 : crossed_[i] > 0;
         if (!slipped) motion.put_on_stop(i);  // exactly: the root is good to round-off of t
@@ -129,6 +137,20 @@ bool Contacts::has_decayed(std::size_t i, Gap gap, StopMotion& motion) {
   if (!(std::abs(gap.rate) * period < asleep_[i])) return false;
   const Push push = motion.push(i, closed_);
   return std::abs(push.acceleration) * period * period <= 2 * asleep_[i] + push.open * period * period;
+}
+
+/// Is a crossing but noise of a joint that rests on its stop? What pushes it turns it back then, before it is farther
+/// away than its place is known. At one time that is said once: a search that finds the crossing again is right.
+bool Contacts::comes_back(std::size_t i, Gap gap, double t, StopMotion& motion) {
+  constexpr double slow = 1e-6;  // faster ones are looked at no further
+  const double known = std::min(100 * motion.noise(i), on_stop);
+  if (!(std::abs(gap.rate) * stops_[i].period < slow && std::abs(gap.value) < known) || t == came_back_[i])
+    return false;
+  const bool is_outwards = crossed_[i] != 0 ? crossed_[i] < 0 : gap.value < 0;
+  const double back = (is_outwards ? 1 : -1) * motion.push(i, closed_).acceleration;
+  if (!(gap.rate * gap.rate < 2 * back * known)) return false;
+  came_back_[i] = t;
+  return true;
 }
 
 /// Does something push a joint that is on its stop, so that it will not stay there? One that is pressed against its

@@ -101,6 +101,7 @@ class Contacts {
  private:
   bool slipped_through(std::size_t i, Gap, double noise) const;
   bool has_decayed(std::size_t i, Gap, StopMotion&);
+  bool comes_back(std::size_t i, Gap, double t, StopMotion&);
   bool is_pushed(std::size_t i, StopMotion&) const;
   double small(std::size_t i, const StopMotion&) const;
   void settle(std::size_t i, double t);
@@ -112,7 +113,8 @@ class Contacts {
   std::vector<char> closed_, armed_;
   std::vector<int> crossed_;
   std::vector<Approach> approach_;
-  std::vector<double> asleep_;  // ways below this do not wake a joint that has settled on its way [rad] or [m]
+  std::vector<double> asleep_;     // ways below this do not wake a joint that has settled on its way [rad] or [m]
+  std::vector<double> came_back_;  // when it last did [s]; or -1
   ChatterGuard chatter_;
 };
 

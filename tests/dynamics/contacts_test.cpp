@@ -1,0 +1,72 @@
+#include "dynamics/events/contacts.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace flexboom {
+namespace {
+
+/// One joint on its stop, at a rate, and pushed.
+struct OneStop final : StopMotion {
+  double place = 0, rate = 0, acceleration = 0;
+  int puts = 0;
+  Gap gap(std::size_t) override { return {place, rate}; }
+  Push push(std::size_t, std::span<const char>) override { return {acceleration, 0}; }
+  double noise(std::size_t) const override { return 1e-18; }
+  void put_on_stop(std::size_t) override { ++puts; }
+};
+
+/// The events of a crossing at this rate, outwards or back, of a joint that was in motion before. It is found so often.
+std::vector<StopEvent> events_of(double rate, double acceleration, int times = 1) {
+  FlightOptions options;
+  options.tolerance = 1e-6;
+  Contacts contacts({{0, "hinge", true, 0.01, 1}}, options, 1);
+  OneStop motion;
+  motion.rate = rate < 0 ? 1 : -1;
+  contacts.begin(motion);
+  motion.rate = rate, motion.acceleration = acceleration;
+  contacts.crossed()[0] = rate < 0 ? -1 : 1;
+  std::vector<StopEvent> events;
+  for (int k = 0; k < times; ++k) EXPECT_TRUE(contacts.update(motion, 1, events));
+  EXPECT_EQ(motion.puts, times);
+  return events;
+}
+
+TEST(Contacts, ACrossingIsTold) {
+  ASSERT_EQ(events_of(0.5, -3).size(), 1u);
+  EXPECT_TRUE(events_of(0.5, -3)[0].contact);
+  ASSERT_EQ(events_of(-0.5, 3).size(), 1u);
+  EXPECT_FALSE(events_of(-0.5, 3)[0].contact);
+}
+
+/// The events of a joint that is found on the other side, with no crossing seen.
+std::vector<StopEvent> events_beyond(double place, double acceleration) {
+  FlightOptions options;
+  Contacts contacts({{0, "hinge", true, 0.01, 1}}, options, 1);
+  OneStop motion;
+  motion.rate = place < 0 ? 1 : -1;
+  contacts.begin(motion);
+  motion.place = place, motion.rate = 0, motion.acceleration = acceleration;
+  std::vector<StopEvent> events;
+  EXPECT_TRUE(contacts.update(motion, 1, events));
+  return events;
+}
+
+// A joint that rests on its stop has a rate of round-off when a load sets in: of either sign.
+TEST(Contacts, RoundOffIsNoneWhereWhatPushesTurnsItBack) {
+  EXPECT_TRUE(events_of(1e-17, -3).empty());
+  EXPECT_TRUE(events_of(-1e-17, 3).empty());
+  EXPECT_TRUE(events_of(1e-9, -3).empty());      // 2e-19 rad beyond
+  EXPECT_EQ(events_of(1e-17, 3).size(), 1u);     // pressed against its stop
+  EXPECT_EQ(events_of(-1e-17, -3).size(), 1u);   // and off it
+  EXPECT_EQ(events_of(2e-6, -3).size(), 1u);     // 7e-13 rad beyond
+  EXPECT_EQ(events_of(1e-9, -3, 2).size(), 1u);  // a search that goes on finding it
+  EXPECT_TRUE(events_beyond(1e-17, -3).empty());
+  EXPECT_TRUE(events_beyond(-1e-17, 3).empty());
+  EXPECT_EQ(events_beyond(1e-16, 3).size(), 1u);
+  EXPECT_EQ(events_beyond(1e-12, -3).size(), 1u);
+}
+
+}  // namespace
+}  // namespace flexboom
