@@ -431,6 +431,43 @@ TEST(Abaqus, OneInstanceOfOnePart) {
   EXPECT_NEAR(total_mass(mesh), 8000, 1e-9);
 }
 
+TEST(Abaqus, CurvedBeamsAreSaidToBeTwoStraightHalves) {
+  const auto noted = [](const std::string& middle) {
+    return has_note(
+        read("*NODE\n1, 0, 0, 0\n2, 1, " + middle + ", 0\n3, 2, 0, 0\n*ELEMENT, TYPE=B32, ELSET=E\n1, 1, 2, 3\n" +
+             steel + "*BEAM SECTION, ELSET=E, MATERIAL=Steel, SECTION=RECT\n0.1, 0.2\n"),
+        "beams with three nodes are curved");
+  };
+  EXPECT_TRUE(noted("0.1"));
+  EXPECT_FALSE(noted("0"));
+}
+
+// By 90 degrees about z, so that x of the part is y of the assembly.
+TEST(Abaqus, DirectionsOfAPartTurnWithItsInstance) {
+  const auto deck = [](const std::string& of_part, const std::string& position, const std::string& after) {
+    return read(
+               "*PART, NAME=P\n*NODE\n1, 0, 0, 0\n2, 0, 0, 1\n*ELEMENT, TYPE=B31, ELSET=E\n1, 1, 2\n"
+               "*BEAM SECTION, ELSET=E, MATERIAL=Steel, SECTION=RECT\n0.1, 0.2\n1, 0, 0\n" +
+               of_part + "*END PART\n*ASSEMBLY, NAME=A\n*INSTANCE, NAME=I, PART=P\n" + position +
+               "*END INSTANCE\n*END ASSEMBLY\n" + steel + after)
+        .mesh;
+  };
+  const std::string turned = "5, 0, 0\n5, 0, 0, 5, 0, 1, 90\n", slide = "*NSET, NSET=T\n2\n*TRANSFORM, NSET=T";
+  const Mesh section = deck("", turned, "");
+  EXPECT_NEAR((section.beam_properties[0].y_axis - Vector3d(0, 1, 0)).norm(), 0, 1e-15);
+  // Along (1, 1, 0) of the part, which is (-1, 1, 0).
+  const Mesh plane = deck(slide + "\n1, 1, 0, -1, 1, 0\n", turned, "*BOUNDARY\nI.2, 1\n");
+  ASSERT_EQ(plane.equations.size(), 1U);
+  ASSERT_EQ(plane.equations[0].terms.size(), 2U);
+  EXPECT_NEAR(plane.equations[0].terms[0].coefficient * plane.equations[0].terms[1].coefficient, -0.5, 1e-15);
+  // The axis runs through (1, 0, z) of the part, which is (5, 1, z): the radius to node 2 is along -y.
+  const Mesh radius = deck(slide + ", TYPE=C\n1, 0, 0, 1, 0, 1\n", turned, "*BOUNDARY\nI.2, 1\n");
+  EXPECT_EQ(held(radius, 2), "2");
+  const std::string equation = "*EQUATION\n2\n1, 1, 1., 2, 2, 1.\n";
+  EXPECT_EQ(deck(equation, "5, 0, 0\n", "").equations.size(), 1U);
+  EXPECT_NE(input_error([&] { deck(equation, turned, ""); }).find("whose instance is rotated"), std::string::npos);
+}
+
 TEST(Abaqus, IncludesAreRelativeToTheIncludingFile) {
   const std::string path = test_deck("include_main.inp").string();
   const MeshFile file = read_abaqus(file_bytes(path), path);

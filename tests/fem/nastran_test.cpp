@@ -113,8 +113,9 @@ TEST(Nastran, CaseControlSelectsSupportsAndModes) {
   EXPECT_EQ(only.modes, 7);
   EXPECT_TRUE(has_note(only, "the only set, 4, is used"));
   // Nastran leaves out what a case control does not select.
-  for (const char* sets : {"SPC1,2,123,1\n", "MPC,2,1,1,1.,2,1,1.\n"}) {
-    const std::string message = input_error([&] { read("SOL 103\nCEND\nMETHOD=1\nBEGIN BULK\n" + small + sets); });
+  for (const char* unselected : {"SPC1,2,123,1\n", "MPC,2,1,1,1.,2,1,1.\n"}) {
+    const std::string message =
+        input_error([&] { read("SOL 103\nCEND\nMETHOD=1\nBEGIN BULK\n" + small + unselected); });
     EXPECT_NE(message.find("sets 2, and without that Nastran leaves them out"), std::string::npos) << message;
   }
 }

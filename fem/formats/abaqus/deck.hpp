@@ -149,11 +149,15 @@ struct Transform {
   std::string_view at;
 };
 
+/// Of a part, which has axes of its own.
 struct Instance {
   std::string name;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();  // directions of the part -> of the assembly
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
+
+  /// Where a point of the part is.
+  Eigen::Vector3d place(const Eigen::Vector3d& point) const { return pivot + turn * (point + shift - pivot); }
 };
 
 struct Deck {

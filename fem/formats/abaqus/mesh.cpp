@@ -167,6 +167,13 @@ void require_direction(const Deck& deck, const Mesh& mesh, const ElementLine& li
                           line.at, deck.lines.text().line_location(deck.sections[at(line.section)].at)));
 }
 
+bool is_bent(const Mesh& mesh, const int* nodes) {
+  constexpr double straight = 1e-3;  // of its length; the halves are shorter than an arc by 7e-7 of it then
+  const Vector3d chord = mesh.nodes.col(nodes[2]) - mesh.nodes.col(nodes[0]);
+  const Vector3d to_middle = mesh.nodes.col(nodes[1]) - mesh.nodes.col(nodes[0]);
+  return chord.cross(to_middle).norm() > straight * chord.squaredNorm();
+}
+
 void add_element(const Lookup& lookup, Mesh& mesh, const ElementLine& line, int type, int property) {
   const int* nodes = lookup.nodes_of(line);
   if (line.kind->role == Role::solid) {
@@ -180,6 +187,10 @@ void add_element(const Lookup& lookup, Mesh& mesh, const ElementLine& line, int 
     mesh.element_labels.push_back(std::abs(line.label));
     require_direction(lookup.deck(), mesh, line, mesh.elements.back());
   }
+  if (line.kind->nodes == 3 && is_bent(mesh, nodes))
+    lookup.deck().notes.add(
+        "beams with three nodes are curved: two straight halves stand for each, which are shorter and "
+        "lighter than its arc; more elements make that small");
 }
 
 void add_elements(Lookup& lookup, Mesh& mesh) {
@@ -223,9 +234,27 @@ void place_nodes(const Deck& deck, Mesh& mesh) {
   const Instance& instance = *deck.instance;
   for (size_t i = 0; i < labels.size(); ++i) {
     if (labels[i] < 0) continue;  // of the assembly
-    const Vector3d x = mesh.nodes.col(static_cast<int>(i)) + instance.shift;
-    mesh.nodes.col(static_cast<int>(i)) = instance.pivot + instance.turn * (x - instance.pivot);
+    mesh.nodes.col(static_cast<int>(i)) = instance.place(mesh.nodes.col(static_cast<int>(i)));
   }
+}
+
+/// Directions that a part gives turn with its instance.
+void place_directions(Deck& deck) {
+  if (!deck.instance) return;
+  const Instance& instance = *deck.instance;
+  for (SectionLine& section : deck.sections)
+    if (section.elements.in_part) section.beam.y_axis = instance.turn * section.beam.y_axis;
+  for (Transform& t : deck.transforms) {
+    if (!t.nodes.in_part) continue;
+    t.a = t.cylindrical ? instance.place(t.a) : Vector3d(instance.turn * t.a);
+    t.b = t.cylindrical ? instance.place(t.b) : Vector3d(instance.turn * t.b);
+  }
+  if (instance.turn.isIdentity()) return;
+  for (const Equation& equation : deck.equations)
+    if (equation.terms.front().node.in_part)
+      deck.fail(equation.at,
+                "an equation in a part whose instance is rotated: programs differ in whether its directions "
+                "turn as well; give it in the assembly");
 }
 
 void add_masses(const Lookup& lookup, Mesh& mesh) {
@@ -290,6 +319,7 @@ MeshFile mesh_of(Deck& deck) {
   MeshFile file;
   file.modes = deck.modes;
   place_nodes(deck, file.mesh);
+  place_directions(deck);
   add_elements(lookup, file.mesh);
   if (file.mesh.elements.empty()) deck.fail({}, "the deck has no solid or beam elements");
   add_masses(lookup, file.mesh);

@@ -101,6 +101,11 @@ void refuse_offset(Deck& deck, const Keyword& keyword, std::string_view paramete
     deck.fail(*value, fmt::format("{} is not understood: the beam must run through the centroid", parameter));
 }
 
+void refuse_second(Deck& deck, const Keyword& keyword, const MaterialLines& material, bool is_second) {
+  if (is_second)
+    deck.fail(keyword.at, fmt::format("material {} has a second {}", flexboom::quoted(material.name), keyword.at));
+}
+
 SectionLine section_line(Deck& deck, const Keyword& keyword, Role role) {
   SectionLine section;
   section.role = role;
@@ -126,7 +131,7 @@ void read_elastic(Deck& deck, const Keyword& keyword) {
   const std::string type = upper_key(keyword.find("TYPE").value_or("ISO"));
   if (type != "ISO" && type != "ISOTROPIC")
     deck.fail(keyword.at, fmt::format("*ELASTIC, TYPE={} is not understood; materials are isotropic (TYPE=ISO)", type));
-  material.elastic.clear();
+  refuse_second(deck, keyword, material, !material.elastic.empty());
   for (const Fields* fields = &need_data(deck, keyword, "Young's modulus and Poisson's ratio"); fields != nullptr;
        fields = deck.lines.next_data()) {
     ElasticRow row{};
@@ -146,7 +151,7 @@ void read_density(Deck& deck, const Keyword& keyword) {
   if (deck.options.material) return;
   deck.lines.allow(keyword, {"DEPENDENCIES"});
   MaterialLines& material = material_of(deck, keyword);
-  material.density.clear();
+  refuse_second(deck, keyword, material, !material.density.empty());
   for (const Fields* fields = &need_data(deck, keyword, "the density"); fields != nullptr;
        fields = deck.lines.next_data()) {
     DensityRow row{};
@@ -228,6 +233,7 @@ void read_mass(Deck& deck, const Keyword& keyword) {
   const Fields& fields = need_data(deck, keyword, "the mass");
   const double mass = deck.real(fields[0], "mass");
   if (mass < 0) deck.fail(fields[0], "the mass must not be negative");
+  if (fields.size() > 1 && !fields[1].empty()) deck.fail(fields[1], "*MASS has one mass, the same in all directions");
   deck.masses.emplace_back(elements, mass);
 }
 

@@ -140,6 +140,7 @@ bool Cards::next_line(std::string_view& line) {
     const std::string_view stripped = raw->substr(0, raw->find('$'));
     if (trimmed(stripped).empty()) {
       if (trimmed(*raw).starts_with("$HMNAME PROP")) remember_name(trimmed(*raw));
+      if (stripped.size() == raw->size() && stripped.size() >= small_width) blank_ = stripped;
       text_.skip_line();
       continue;
     }
@@ -230,7 +231,12 @@ const Card* Cards::next() {
   };
   if (is_continuation(line)) fail(line, "a continuation without a card above");
   append(line, true);
+  blank_ = {};
   while (next_line(line) && is_continuation(line)) {
+    if (!blank_.empty())
+      fail(blank_,
+           "a line of blanks within a card: some programs skip it, others take its fields; begin it with + or "
+           "leave it out");
     text_.skip_line();
     append(line, false);
   }

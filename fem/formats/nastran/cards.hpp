@@ -76,7 +76,8 @@ class Cards {
   bool has_begin_ = false, has_end_ = false;  // of the bulk data
   std::vector<std::string> case_notes_;
   Card card_;
-  std::string_view mark_;  // at the end of the last line of the card
+  std::string_view mark_;   // at the end of the last line of the card
+  std::string_view blank_;  // the last line of blanks since then
   std::vector<std::pair<long, std::string>> property_names_;
 };
 
