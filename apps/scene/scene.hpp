@@ -135,8 +135,9 @@ struct Scene {
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  // inertial axes [m/s^2]
 
   std::filesystem::path
-      bodies_kept_in;   // where reduced bodies that take long are kept; empty: nowhere; not in the file
-  bool verify = false;  // hold the run against runs that share little with it; not in the file
+      bodies_kept_in;           // where reduced bodies that take long are kept; empty: nowhere; not in the file
+  double gravity_strength = 1;  // of OrbitalField; not in the file
+  bool verify = false;          // hold the run against runs that share little with it; not in the file
   std::shared_ptr<const SavedState> from;  // instead of the start: where an earlier run ended; not part of the file
 
   std::vector<std::string> warnings;  // what was repaired or is odd (e.g. an inertia that is not symmetric)

@@ -31,7 +31,7 @@ Orbit orbit_of(const Scene& scene) {
 
 std::optional<OrbitalField> field_of(const Scene& scene) {
   if (!scene.orbit || scene.orbit->gravity == "none") return {};
-  return OrbitalField{orbit_of(scene)};
+  return OrbitalField{.orbit = orbit_of(scene), .strength = scene.gravity_strength};
 }
 
 Eigen::Vector3d lvlh_angles(const Eigen::Vector4d& attitude, const Orbit& orbit, double t) {

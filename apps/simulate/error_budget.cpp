@@ -114,8 +114,18 @@ struct Repeats {
 
   /// Differences of the outputs of another flight. Those that count must not be that flight's own errors of time, which
   /// contacts can make many tolerances. Where they are not far beyond the tolerance, the scene is flown again with a
-  /// digit more.
-  std::vector<OutputDifference> change(const Run&, const Scene& other, int refine = 0) const;
+  /// digit more, unless they are far larger than the error of time of the run, or borne as they are. `time_error` is
+  /// that; NaN: nobody knows.
+  std::vector<OutputDifference> change(
+      const Run&, const Scene& other, double time_error, int refine = 0,
+      const std::function<bool(const std::vector<OutputDifference>&)>& borne = {}) const;
+
+  /// May differences be errors of time?
+  bool may_be_of_time(double differences, double time_error) const {
+    constexpr double counts = 1.0 / 3, beyond_doubt = 100, far_larger = 30;
+    const double of_tolerance = differences / floors.tolerance;
+    return of_tolerance > counts && of_tolerance < beyond_doubt && !(differences > far_larger * time_error);
+  }
 };
 
 /// What a repeat has found.
@@ -126,11 +136,26 @@ struct Finding {
 
 using Part = double OutputErrors::*;
 
+/// The truncation of an output for what as many modes more change. A motion converges like 1 / n^2 or faster, so that
+/// they change three quarters of the error or more. A jump of an acceleration rings all modes of a body, and a load of
+/// its joint converges like their effective mass: as 1 / n. What as many modes more change is then half of the error.
+double truncation_per_change(const std::string& output) { return is_load(output) ? 2 : 1.25; }
+
 /// What fills a budget.
 struct Measuring {
   Repeats repeats;
   std::vector<std::string>& plan;
   ErrorBudget budget{};
+
+  /// Would these truncations keep the tolerance with the other parts, though the repeat has an error of time of its
+  /// own?
+  bool are_borne(const std::vector<OutputDifference>& changes) const {
+    return std::ranges::all_of(budget.outputs, [&](const OutputErrors& o) {
+      const auto d = std::ranges::find(changes, o.name, &OutputDifference::name);
+      if (d == changes.end()) return true;
+      return o.known() + truncation_per_change(o.name) * (d->error + o.time) <= repeats.floors.tolerance;
+    });
+  }
 
   void missing(std::string_view part, std::string_view why) {
     budget.missing.push_back(fmt::format("{} not measured: {}", part, why));
@@ -152,11 +177,12 @@ struct Measuring {
   }
 };
 
-std::vector<OutputDifference> Repeats::change(const Run& run, const Scene& other, int refine) const {
-  constexpr double counts = 1.0 / 3, beyond_doubt = 100;  // times the tolerance
+std::vector<OutputDifference> Repeats::change(
+    const Run& run, const Scene& other, double time_error, int refine,
+    const std::function<bool(const std::vector<OutputDifference>&)>& borne) const {
   std::vector<OutputDifference> differences = difference(run, repeated(run, other, refine), other);
-  const double most = largest(differences) / floors.tolerance;
-  if (!(most > counts && most < beyond_doubt) || hooks.stopped()) return differences;
+  if (!may_be_of_time(largest(differences), time_error) || hooks.stopped()) return differences;
+  if (borne && borne(differences)) return differences;
   return difference(run, repeated(run, with_a_digit_more(other), refine), other);
 }
 
@@ -185,31 +211,33 @@ std::optional<Beyond> modes_beyond(const Scene& scene, const Scene& flown, const
   return r;
 }
 
-/// What they change, and what still more would. A motion converges like 1 / n^2 or faster, so that as many modes more
-/// change three quarters of the error or more. A jump of an acceleration rings all modes of a body, and a load of its
-/// joint converges like their effective mass: as 1 / n. What as many modes more change is then half of the error.
-Finding truncation_of(std::optional<Beyond> beyond, const Run& run, const Scene& flown, double time_error,
-                      const Repeats& repeats) {
+/// What modes beyond those of a run change, and what still more would.
+Finding truncation_of(std::optional<Beyond> beyond, const Run& run, const Scene& flown, const Measuring& m) {
   if (!beyond) return {};
+  const Repeats& repeats = m.repeats;
+  const double time_error = m.budget.time;
+  const auto borne = [&m](const std::vector<OutputDifference>& changes) { return m.are_borne(changes); };
   Scene& more = beyond->scene;
-  if (!beyond->has_few_digits) fly_ahead(with_a_digit_more(more), repeats.hooks, 0, bearable_steps(run));  // perhaps
-  Finding r{repeats.change(run, more)};
+  // A digit more may be wanted as well.
+  if (!beyond->has_few_digits && repeats.may_be_of_time(repeats.floors.tolerance, time_error))
+    fly_ahead(with_a_digit_more(more), repeats.hooks, 0, bearable_steps(run));
+  Finding r{repeats.change(run, more, beyond->has_few_digits ? unknown : time_error, 0, borne)};
   give_up_ahead(repeats.hooks);
   const double noise = time_error > flown.step_tolerance() ? time_error / flown.step_tolerance() : 1;
   if (beyond->has_few_digits && largest(r.differences) <= 10 * noise * more.tolerance) {
     more.tolerance = flown.tolerance, more.integrator_tolerance = flown.integrator_tolerance;
-    r.differences = repeats.change(run, more);
+    r.differences = repeats.change(run, more, time_error, 0, borne);
   }
-  for (OutputDifference& d : r.differences) d.error *= is_load(d.name) ? 2 : 1.25;
+  for (OutputDifference& d : r.differences) d.error *= truncation_per_change(d.name);
   return r;
 }
 
 /// What finer elements change. @throws InputError where the scene has none.
-Finding discretisation_of(const Scene& scene, const Run& run, const Scene& flown, const Repeats& repeats) {
+Finding discretisation_of(const Scene& scene, const Run& run, const Scene& flown, const Measuring& m) {
   require_richer(scene, &RicherBodies::finer_elements, "finer elements");
   if (!any_elastic(scene, "beam") && !any_elastic(scene, "solid")) return {};
   const Finer next = finer_elements(flown);
-  return {repeats.change(run, flown, next.steps), next.error_per_change};
+  return {m.repeats.change(run, flown, m.budget.time, next.steps), next.error_per_change};
 }
 
 /// All that the scene leaves to the program.
@@ -269,6 +297,20 @@ bool is_asked_for(const Scene& scene, const std::string& output) {
                              [&](const std::string& text) { return wanted_output(text).name == output; });
 }
 
+/// What gravity beyond its gradient changes by way of the motion, which it makes run ahead or behind: measured with a
+/// stronger gradient. Nothing where that is far below the tolerance.
+std::vector<OutputDifference> of_field(const FieldError& field, const Run& run, const Scene& flown,
+                                       const Repeats& repeats) {
+  constexpr double stronger = 10, counts = 1e-2;  // times the share, and of the tolerance
+  const double grown = field.share * std::max(1.0, field.turns * field.turns);
+  if (!(grown > counts * repeats.floors.tolerance)) return {};
+  Scene other = flown;
+  other.gravity_strength = 1 + stronger * field.share;
+  std::vector<OutputDifference> differences = repeats.difference(run, repeats.repeated(run, other), flown);
+  for (OutputDifference& d : differences) d.error /= stronger;
+  return differences;
+}
+
 /// What geometric stiffness changes where it is left out, and what is left out even with it. The latter is the square
 /// of the deflection, and vibrations whose frequency depends on it. Where geometric stiffness changes too much and the
 /// scene leaves it open, the scene has it from then on. A run with it then takes the place of `run`.
@@ -295,13 +337,14 @@ double linearisation_error(Scene& scene, Scene& flown, Run& run, Measuring& m) {
     m.plan.push_back(fmt::format("geometric stiffness changes the outputs by {:.1e}: the run that is kept has it",
                                  largest(differences)));
     differences.clear();
-    if (leaves_stiffening_out(run)) differences = m.repeats.change(run, with_stiffening(flown));
+    if (leaves_stiffening_out(run)) differences = m.repeats.change(run, with_stiffening(flown), unknown);
   }
   add(differences, m.repeats.difference(run.outputs, with_late_vibrations(run, flown), flown));
   double deflection = 0;
   for (const Bending& b : run.bending) deflection = std::max(deflection, b.of_length);
   const std::vector<std::string> given = prescribed_outputs(scene);
   const FieldError field = field_error(scene, run.bodies);
+  add(differences, of_field(field, run, flown, m.repeats));
   const auto left_out = [&](const OutputErrors& o) {
     if (std::ranges::find(given, o.name) != given.end()) return 0.0;
     const double drift = !is_asked_for(scene, o.name)    ? 0
@@ -363,11 +406,11 @@ ErrorBudget budget_by_repeats(Scene& scene, Run& run, const RunHooks& hooks, std
   scene.integrator_tolerance = flown.integrator_tolerance;
   look_beyond();
   budget.discretisation = measured("discretisation", [&] {
-    return m.enter(&OutputErrors::discretisation, discretisation_of(scene, run, flown, m.repeats));
+    return m.enter(&OutputErrors::discretisation, discretisation_of(scene, run, flown, m));
   });
   if (has_beyond)
     budget.truncation = measured("truncation", [&] {
-      return m.enter(&OutputErrors::truncation, truncation_of(std::move(beyond), run, flown, budget.time, m.repeats));
+      return m.enter(&OutputErrors::truncation, truncation_of(std::move(beyond), run, flown, m));
     });
   budget.measured = !hooks.stopped();
   for (const std::string& line : budget.missing) plan.push_back("error budget: " + line);

@@ -14,7 +14,7 @@ namespace {
 
 /// Equal for equal flights alone: bodies that were read are told apart by where they are, not by their files.
 std::string all_of(const Scene& scene, int refine) {
-  std::string text = fmt::format("{} {}", refine, to_toml(scene));
+  std::string text = fmt::format("{} {} {}", refine, scene.gravity_strength, to_toml(scene));
   for (const BodyScene& b : scene.bodies) text += fmt::format("{} ", static_cast<const void*>(b.reduced.get()));
   return text;
 }

@@ -148,8 +148,8 @@ void describe(const Scene& scene, const Run& run, std::vector<std::string>& plan
   describe_model(scene, run, plan);
   if (const FieldError field = field_error(scene, run.bodies); field.share > 0)
     plan.push_back(
-        fmt::format("orbit: gravity is linear within a body: outputs change by {:.0e} with its next term, and "
-                    "the system drifts by {:.0e} m in {:g} s, which counts where its position is asked for",
+        fmt::format("orbit: gravity is linear within a body: its next term has {:.0e} of the gradient, and the "
+                    "system drifts by {:.0e} m in {:g} s, which counts where its position is asked for",
                     field.share, field.position, scene.duration));
   if (scene.orbit)
     plan.push_back(fmt::format("orbit: rate {:.6e} rad/s{}; differential gravity {}, {:.1e} 1/s^2", scene.orbit->rate(),

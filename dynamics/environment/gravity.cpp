@@ -14,9 +14,9 @@ using Eigen::Vector3d;
 LocalGravity OrbitalField::at(double t, const Vector3d& rho) const {
   const Vector3d R = orbit.at(t).position;
   const Planet& planet = orbit.planet();
-  if (exact) return {differential_gravity(planet, R, rho), gravity_gradient(planet, R + rho)};
+  if (exact) return {differential_gravity(planet, R, rho), strength * gravity_gradient(planet, R + rho)};
   const Matrix3d G = gravity_gradient(planet, R);
-  return {G * rho, G};
+  return {G * rho, strength * G};
 }
 
 // With u = u0 + S q and the second moment sum dm u u^T = tr(J)/2 I - J, and tr G = 0:

@@ -26,6 +26,8 @@ struct OrbitalField {
   Orbit orbit;
   /// The difference of gravity between a body's place and the reference point: all of it, or its linear part.
   bool exact = true;
+  /// Of the gradient within a body: error estimates ask what a little more of it would change.
+  double strength = 1;
 
   /// At time t [s], at rho from the reference point (inertial axes) [m]. Allocates nothing.
   /// @throws InputError where `orbit.at` does.
@@ -40,7 +42,8 @@ struct BodyGravity {
 };
 
 /// Of a field given about the BRF origin in BRF axes. Within the body the field is linear: what is left out is the part
-/// (size of the body)/(distance of the planet) of the gradient.
+/// (size of the body)/(distance of the planet) of the gradient. It is least where the field is linear about the mass
+/// centre, as LocalGravity::at gives it.
 /// @throws InputError if q has not the size n.
 BodyGravity body_gravity(const ReducedBody&, const LocalGravity&, const Eigen::VectorXd& q);
 

@@ -110,10 +110,12 @@ OrbitState Orbit::at(double t) const {
   if (path_->steps.empty()) {
     s = kepler(planet_.mu, path_->start, t);
   } else {
-    if (!(t >= 0 && t <= path_->duration))
+    const double round_off = 1e-12 * path_->duration;  // of times that are sums of steps
+    if (!(t >= -round_off && t <= path_->duration + round_off))
       throw InputError(
           fmt::format("orbit: it was integrated from 0 to {:g} s, and {:.17g} s was asked for", path_->duration, t));
-    const EnckeStep& step = *std::ranges::lower_bound(path_->steps, t, {}, &EnckeStep::end);
+    const double within = std::min(t, path_->steps.back().end);
+    const EnckeStep& step = *std::ranges::lower_bound(path_->steps, within, {}, &EnckeStep::end);
     const EnckeArc& arc = path_->arcs[static_cast<size_t>(step.arc)];
     Eigen::Matrix<double, 6, 1> d = step.c.col(step.c.cols() - 1);
     for (Eigen::Index k = step.c.cols() - 2; k >= 0; --k) d = step.c.col(k) + (t - step.end) * d;

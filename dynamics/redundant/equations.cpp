@@ -211,8 +211,10 @@ double Equations::pull_by_field(size_t i, double t, const double* y, double* F) 
   const BodyPlaces& at = places_[i];
   const Eigen::Matrix3d A = rotation_matrix(Map<const Eigen::Vector4d>(y + at.p));
   const Map<const VectorXd> q(y + at.q, at.n), u(y + at.u, at.n);
-  const BodyGravity g =
-      body_gravity(scene_.bodies[i], scene_.field->at(t, Map<const Eigen::Vector3d>(y + at.R)).in_axes(A), q);
+  const ReducedBody& body = scene_.bodies[i];
+  const Eigen::Vector3d centre = A * (body.mc0 / body.m);  // about which the field is linear
+  const LocalGravity field = scene_.field->at(t, Map<const Eigen::Vector3d>(y + at.R) + centre).at(-centre);
+  const BodyGravity g = body_gravity(body, field.in_axes(A), q);
   const Eigen::Vector3d force = A * g.force;
   Map<Eigen::Vector3d>(F + at.v) -= force;
   Map<Eigen::Vector3d>(F + at.w) -= g.torque;

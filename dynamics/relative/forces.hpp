@@ -85,12 +85,18 @@ inline equations::Gravity<Quad> gravity_at(const OrbitalField& field, double t, 
   return r;
 }
 
-/// Gravity of a field on a body: m a + G mc, mc x a + axial(G J), Ct^T a - 1/2 G : dJ/dq_k. In derivatives the field
-/// stays what it is at the body's place: it changes over the size of an orbit.
+/// Gravity of a field on a body: m a + G mc, mc x a + axial(G J), Ct^T a - 1/2 G : dJ/dq_k. The field is linear about
+/// the mass centre of the undeformed body. In derivatives it stays what it is there: it changes over the size of an
+/// orbit.
 template <class C, class T>
 void pull_by_field(const equations::BodyOf<C>& body, const OrbitalField& field, double t, const T* q, const T* q_dot,
                    LinkScratch<T>& s, T& power) {
-  const auto gravity = gravity_at(field, t, Vec3<C>{value_of(s.R0.x), value_of(s.R0.y), value_of(s.R0.z)});
+  const auto value = [](const Vec3<T>& v) { return Vec3<C>{value_of(v.x), value_of(v.y), value_of(v.z)}; };
+  const Vec3<C> in_body = (C(1.0) / body.m) * body.mc0,
+                centre = {dot(value(s.A0.row[0]), in_body), dot(value(s.A0.row[1]), in_body),
+                          dot(value(s.A0.row[2]), in_body)};
+  auto gravity = gravity_at(field, t, value(s.R0) + centre);
+  gravity.acceleration = gravity.acceleration - gravity.gradient * centre;
   const equations::Gravity<T> in_space = {equations::lift<T>(gravity.acceleration),
                                           equations::lift<T>(gravity.gradient)};
   const equations::Gravity<T> here = in_space.at(Vec3<T>{}, s.A0);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 namespace flexboom {
 namespace {
@@ -78,7 +79,7 @@ TEST(Orbit, SmallAnglesAgainstTheFrameKeepTheirTolerance) {
 }
 
 /// A body of a hundred metres, whole or of two that are fixed to each other.
-Scene long_body_in_orbit(bool split) {
+Scene long_body_in_orbit(bool split, double duration) {
   const char* const whole = R"(mass = 1000.0
 inertia = [4e6, 6e6, 3e6]
 )";
@@ -95,9 +96,8 @@ kind = "fixed"
 a = { body = "hub", point = [45.0, 0.0, 0.0] }
 b = { body = "part" }
 )";
-  return parse_scene(std::string(R"(format = "flexboom-scene-1"
+  Scene scene = parse_scene(std::string(R"(format = "flexboom-scene-1"
 name = "long"
-duration = 6000.0
 output_step = 20.0
 accuracy = { tolerance = 1e-6, outputs = ["hub.rotation", "lvlh.pitch", "hub.position"] }
 orbit = { altitude = 5e5, inclination = 1.2, gravity = "differential" }
@@ -108,18 +108,31 @@ start_omega = [0.0003, -0.0011, 0.0002]
 [[bodies]]
 name = "hub"
 )") + (split ? parts : whole),
-                     "long");
+                            "long");
+  scene.duration = duration;
+  return scene;
 }
 
-// Gravity is linear within a body, so a body of two parts knows more of it. The budget has the difference.
+// Gravity is linear within a body, so a body of two parts knows more of it. The budget has the difference. It grows
+// from orbit to orbit, as phases do.
 TEST(Orbit, WhatGravityWithinABodyLeavesOutIsInTheBudget) {
-  const RunResult whole = run_scene(long_body_in_orbit(false), {}), parts = run_scene(long_body_in_orbit(true), {});
-  EXPECT_FALSE(whole.budget.within(1e-6));
-  for (const OutputDifference& d : compare_outputs(whole.outputs, parts.outputs, whole.scene.outputs)) {
-    const auto said = std::ranges::find(whole.budget.outputs, d.name, &OutputErrors::name);
-    ASSERT_NE(said, whole.budget.outputs.end());
-    EXPECT_GT(d.error * d.scale, 1e-6 * d.size) << d.name;
-    EXPECT_GT(said->linearisation * said->scale, 0.8 * d.error * d.scale) << d.name;
+  const std::pair<double, const char*> flights[] = {{6000, "relative"}, {6000, "multipliers"}, {60000, "relative"}};
+  for (const auto& [duration, formulation] : flights) {
+    Scene one = long_body_in_orbit(false, duration), two = long_body_in_orbit(true, duration);
+    one.formulation = two.formulation = formulation, two.error_budget = false;
+    const RunResult whole = run_scene(one, {}), parts = run_scene(two, {});
+    EXPECT_FALSE(whole.budget.within(1e-6));
+    for (const OutputDifference& d : compare_outputs(whole.outputs, parts.outputs, whole.scene.outputs)) {
+      const auto said = std::ranges::find(whole.budget.outputs, d.name, &OutputErrors::name);
+      ASSERT_NE(said, whole.budget.outputs.end());
+      std::printf("%s, %g s, %s: %.1e, said to be %.1e\n", formulation, duration, d.name.c_str(), d.error,
+                  said->linearisation);
+      EXPECT_GT(d.error * d.scale, 1e-6 * d.size) << d.name;
+      EXPECT_GT(said->linearisation * said->scale, d.error * d.scale) << d.name;
+      // A pull along the path that turns with the body averages out, and is bounded as if it did not.
+      if (d.name == "hub.position") continue;
+      EXPECT_LT(said->linearisation * said->scale, 60 * d.error * d.scale) << d.name;
+    }
   }
 }
 

@@ -218,6 +218,8 @@ TEST(Orbit, RefusesWhatIsNoOrbit) {
   EXPECT_THROW(Orbit({7e6, 0.9, 0, 0, 0, 0}, oblate, 100), InputError);
   EXPECT_THROW(Orbit(iss, oblate, 100).at(101), InputError);
   EXPECT_THROW(Orbit(iss, oblate, 100).at(-1), InputError);
+  const Orbit orbit(iss, oblate, 3.317);  // a time that is a sum of steps may end a digit later
+  EXPECT_LT((orbit.at(std::nextafter(3.317, 4)).position - orbit.at(3.317).position).norm(), 1e-8);
 }
 
 }  // namespace
