@@ -308,6 +308,7 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
   r.motion.stiffening_effect = effect;
   add_states(*system, flight, states);
   set_flown({scene, *system, *r.tree, flight, states}, 0, states.size(), stiffening, r);
+  note_unseen_stiffening(all, stiffening, r.motion.stiffening_effect, r.motion.warnings);
   note_moved_starts(scene, asked, states.front(), r.notes);
   note_bent_starts(scene, system->multibody(), asked, states.front(), r.notes);
   r.integrate_seconds = flight_time.seconds();

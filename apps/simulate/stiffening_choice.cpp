@@ -3,8 +3,11 @@
 #include "apps/simulate/tree_flight.hpp"
 #include "fem/base/check.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace flexboom {
@@ -101,6 +104,22 @@ bool revise_stiffening(const Scene& scene, const Multibody& bodies, const std::v
 bool will_be_revised(const Scene& scene, const Multibody& bodies, const std::vector<LargestStiffening>& effect,
                      std::vector<Stiffening> choice) {
   return revise_stiffening(scene, bodies, effect, choice);
+}
+
+void note_unseen_stiffening(const Multibody& whole, const std::vector<Stiffening>& choice,
+                            std::vector<LargestStiffening>& effect, std::vector<std::string>& warnings) {
+  const std::vector<char> held = held_at_both_ends(whole);
+  for (size_t i = 0; i < choice.size(); ++i) {
+    const ReducedBody& body = whole.bodies[i];
+    if (!held[i] || choice[i] == Stiffening::on || !has_stiffening(body)) continue;
+    effect[i].size = std::numeric_limits<double>::quiet_NaN();
+    warnings.push_back(fmt::format(
+        "body {}: a joint that closes a loop or a spring holds it at both ends, and without geometric stiffness it "
+        "carries "
+        "no load by being held from getting shorter as it bends; what that changes is not known, and stiffening = "
+        "\"auto\" has it",
+        body.name));
+  }
 }
 
 void fly_until_settled(const Scene& scene, const Multibody& bodies, std::vector<LargestStiffening>& effect,

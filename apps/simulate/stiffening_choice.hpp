@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -31,6 +32,11 @@ bool revise_stiffening(const Scene&, const Multibody&, const std::vector<Largest
 /// Would that turn on any? Then the flight that showed it is not worth keeping.
 bool will_be_revised(const Scene&, const Multibody&, const std::vector<LargestStiffening>& effect,
                      std::vector<Stiffening>);
+
+/// A flight without geometric stiffness does not tell what that would change of bodies that are held at both ends.
+/// Their effect is NaN then, and a warning names each. `whole`, as above.
+void note_unseen_stiffening(const Multibody& whole, const std::vector<Stiffening>&,
+                            std::vector<LargestStiffening>& effect, std::vector<std::string>& warnings);
 
 /// How a flight ended, and how far the joint that moved least moved in it.
 struct Flown {

@@ -363,6 +363,7 @@ Run fly_tree(const Scene& scene, std::vector<PreparedBody> bodies, const RunHook
   fly_until_settled(scene, multibody, effect, stiffening, fly);
   r.end = end_of(r, scene, flight.time.back(), flight.y.back(), flight.summary);
   set_flown(scene, std::move(flight), r);
+  note_unseen_stiffening(multibody, stiffening, r.motion.stiffening_effect, r.motion.warnings);
   r.integrate_seconds = flight_time.seconds();
   return r;
 }

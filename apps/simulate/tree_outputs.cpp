@@ -10,6 +10,8 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -84,7 +86,9 @@ void put_body(Columns& out, const std::string& name, const std::optional<MarkerD
   if (tip) out.put(name, ".tip", (*tip)(q));
 }
 
-void put_load(Columns& out, const JointScene& joint, const JointLoad& load) {
+/// `drive`: of its motor, which pushes as two loads do.
+void put_load(Columns& out, const JointScene& joint, JointLoad load, double drive) {
+  (joint.kind == JointKind::hinge ? load.torque : load.force).z() += drive;
   out.put(joint.name, ".force", load.force), out.put(joint.name, ".torque", load.torque);
   if (load.drive.size() == 1) out.put(joint.name, ".drive", load.drive[0]);
   if (load.drive.size() > 1)
@@ -137,6 +141,9 @@ OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
   for (size_t b = 0; b < tips.size(); ++b)
     if (const ReducedBody& body = tree.scene().bodies[b]; const Marker* tip = body.n() > 0 ? tip_of(body) : nullptr)
       tips[b].emplace(body, *tip);
+  std::vector<std::function<double(double)>> drives;  // of joints; empty: none
+  for (const JointScene& j : scene.joints)
+    drives.push_back(j.drive.given() ? course_of(j.drive, scene.duration).function.value : nullptr);
   const size_t flying = first_that_flies(scene);
   std::optional<Orbit> orbit;
   if (scene.orbit && flying < scene.joints.size()) orbit = orbit_of(scene);
@@ -147,7 +154,7 @@ OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
     out.put("t", "", now.time);
     for (size_t i = 0; i < scene.joints.size(); ++i) {
       put_joint(out, scene.joints[i], s.joints[i], centre);
-      if (scene.joints[i].loads) put_load(out, scene.joints[i], now.loads[i]);
+      if (scene.joints[i].loads) put_load(out, scene.joints[i], now.loads[i], drives[i] ? drives[i](now.time) : 0);
     }
     for (size_t b = 0; b < scene.bodies.size(); ++b) put_body(out, scene.bodies[b].name, tips[b], s.q[b]);
     for (size_t w = 0; w < scene.wheels.size(); ++w) out.put(scene.wheels[w].name, ".spin", s.spin[w]);
@@ -192,15 +199,16 @@ void describe_model(const Scene& scene, const Run& run, std::vector<std::string>
       plan.push_back(fmt::format("{0}: no output {0}.tip: {1}", b.name, no_tip(run.bodies[i].body)));
     const bool known = !run.bodies[i].body.Kg.spin.empty();
     const bool on = run.tree->stiffening(static_cast<int>(i)) == Stiffening::on;
-    plan.push_back(
-        known ? fmt::format(
-                    "{}: geometric stiffness {} (stiffening = \"{}\"): its effect reaches {:.2g} of the stiffness of "
-                    "the body",
-                    b.name, on ? "on" : "off", b.stiffening, run.motion.stiffening_effect[i].size)
-              : fmt::format("{}: geometric stiffness is not in the equations{}", b.name,
-                            b.reduced               ? ": it is not in the file"
-                            : b.structure == "eq14" ? ": structure \"eq14\" has none"
-                                                    : ""));
+    const double effect = known ? run.motion.stiffening_effect[i].size : 0;
+    plan.push_back(known ? fmt::format("{}: geometric stiffness {} (stiffening = \"{}\"): its effect {}", b.name,
+                                       on ? "on" : "off", b.stiffening,
+                                       std::isnan(effect)
+                                           ? "is not known"
+                                           : fmt::format("reaches {:.2g} of the stiffness of the body", effect))
+                         : fmt::format("{}: geometric stiffness is not in the equations{}", b.name,
+                                       b.reduced               ? ": it is not in the file"
+                                       : b.structure == "eq14" ? ": structure \"eq14\" has none"
+                                                               : ""));
   }
   for (const JointScene& j : scene.joints)
     plan.push_back(fmt::format("joint {}: {}, {} on {}{}{}", j.name, joint_type(j.kind).name, j.b.body,

@@ -44,6 +44,37 @@ TEST(MomentumDrift, IsUnknownWhereSomethingPushesOrHolds) {
   EXPECT_LT(drift(swing_on_hinge + "[orbit]\naltitude = 4e5\n"), 1e-6);
 }
 
+// What a joint does to its body has the motor in it: here that is all that turns or pushes it.
+TEST(JointLoads, HaveTheDriveInThem) {
+  for (const char* formulation : {"relative", "multipliers"})
+    for (const char* kind : {"hinge", "slider"}) {
+      Scene scene = parse_scene(fmt::format(R"toml(format = "flexboom-scene-1"
+name = "motor"
+duration = 1.0
+output_step = 0.05
+accuracy = {{ tolerance = 1e-9, budget = false }}
+[[bodies]]
+name = "arm"
+mass = 2.0
+inertia = [0.1, 0.2, 0.3]
+centre = [0.5, 0, 0]
+[[joints]]
+name = "motor"
+kind = "{}"
+b = {{ body = "arm" }}
+drive = "sin(3*t)"
+loads = true
+)toml",
+                                            kind),
+                                "motor.toml");
+      scene.formulation = formulation;
+      const RunResult r = run_scene(scene, {});
+      const std::string load = kind == std::string("hinge") ? "motor.torque.z" : "motor.force.z";
+      const Eigen::VectorXd drive = (3 * column(r, "t").array()).sin();
+      EXPECT_LT((column(r, load) - drive).cwiseAbs().maxCoeff(), 1e-12) << formulation << " " << kind;
+    }
+}
+
 std::vector<std::string> names_of_outputs(const Scene& given) {
   Scene scene = given;
   scene.error_budget = false;

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace flexboom {
 namespace {
@@ -86,6 +88,24 @@ TEST(StiffeningChoice, SeesWhatMovesAJointThatNothingElseMoves) {
   free.replace(free.find("start_rate"), std::string::npos, "");
   EXPECT_TRUE(is_on(free));
   EXPECT_TRUE(is_on(free + "[integrator]\nformulation = \"multipliers\"\n"));
+}
+
+// A spring from the tip to the ground: the strip is stretched as it bends, and a flight without that does not show it.
+TEST(StiffeningChoice, IsNotKnownWithoutItWhereBothEndsAreHeld) {
+  std::string text = strip + clamped + R"toml([[springs]]
+name = "stay"
+a = { body = "strip", marker = "tip" }
+b = { body = "ground", point = [2, 0, 0] }
+stiffness = 1e5
+free_length = 1.0
+)toml";
+  text.replace(text.find("modes = 3"), 9, "modes = 3\nstiffening = \"off\"");
+  const RunResult r = run_scene(parse_scene(text, "scene.toml"), {});
+  const auto has = [](const std::vector<std::string>& lines, std::string_view part) {
+    return std::ranges::any_of(lines, [&](const std::string& l) { return l.find(part) != std::string::npos; });
+  };
+  EXPECT_TRUE(has(r.warnings, "body strip: a joint that closes a loop or a spring holds it at both ends"));
+  EXPECT_TRUE(has(r.plan, "strip: geometric stiffness off (stiffening = \"off\"): its effect is not known"));
 }
 
 TEST(StiffeningChoice, BeginsWithItWhereStopsAreRigid) { EXPECT_TRUE(is_on(dropped("restitution = 0.8"))); }
