@@ -147,12 +147,23 @@ class TreeCheck {
     }
   }
 
+  /// Does a function grow without an end toward a place, whatever it is there? The first look may have hit a pole,
+  /// where round-off leaves a large number.
+  static bool grows_toward(const std::function<double(double)>& value, double place, double width) {
+    constexpr double far = 0x1p-16, near = 0x1p-32, of_a_pole = 100;  // a pole of order 1/2 grows by 256
+    const auto beside = [&](double d) {
+      return std::max(std::abs(value(place - d * width)), std::abs(value(place + d * width)));
+    };
+    return beside(near) > of_a_pole * beside(far);
+  }
+
   /// Where a function has its largest value between two times, if that goes on growing however near one looks. A look
   /// that comes near to a pole by chance is the largest of the next ones, too. A fast sine that is zero at the first
   /// looks grows at the next ones, and then no more.
   static std::optional<double> pole_of(const std::function<double(double)>& value, double from, double to) {
     constexpr int zooms = 10, by_chance = 4, looks = 16;
     constexpr double of_a_peak = 1.5, of_a_pole = 100;
+    const double width = to - from;
     double first = 0, later = 0, largest = 0, place = 0;
     for (int zoom = 0; zoom < zooms; ++zoom) {
       const double step = (to - from) / looks;
@@ -163,7 +174,7 @@ class TreeCheck {
       }
       if (zoom == 0) first = largest;
       if (zoom == by_chance) {
-        if (largest < of_a_peak * first) return {};
+        if (largest < of_a_peak * first) return grows_toward(value, place, width) ? std::optional(place) : std::nullopt;
         later = largest;
       }
       from = place - step, to = place + step;
@@ -218,6 +229,7 @@ class TreeCheck {
       return;
     constexpr double too_little = 1e-12;
     const RigidScene& rigid = *body->rigid;
+    if (!(rigid.mass > 0) || !rigid.inertia.allFinite()) return;  // a fault of its own
     const Eigen::Matrix3d J =
         rigid.inertia + centre_inertia(rigid.mass, Eigen::Vector3d(rigid.mass * (rigid.centre - j.b.point)));
     const Eigen::Matrix3d axes = j.b.axes();
@@ -246,7 +258,8 @@ class TreeCheck {
       faults_.add(path + ".closes_loop", "is true, so the start of the joint follows from the others; drop its own");
   }
 
-  /// A jump of the rate would need an impulse, which no integrator sees between two of its times.
+  /// A jump of the rate would need an impulse, which no integrator sees between two of its times. An acceleration
+  /// without a bound would need steps without an end.
   void rate_without_jumps(const std::string& path, const CourseScene& c) {
     constexpr int looks = 1024;
     if (!c.given() || !(std::isfinite(scene_.duration) && scene_.duration > 0)) return;
@@ -281,6 +294,15 @@ class TreeCheck {
       if (std::abs(step) > 4 * near * steepest + 1e-9 * std::abs(course.function.value(t)))
         return faults_.add(path,
                            fmt::format("jumps by {:.4g} at t = {:.6g} s; a joint cannot, it needs a ramp", step, t));
+      const auto grows = [&](double side) {  // without an end, toward the corner
+        const double nearer = std::abs(course.function.acceleration(t + side / 16));
+        return nearer > 2 * std::abs(course.function.acceleration(t + side)) && nearer * near > 1e-9 * fastest;
+      };
+      if (!std::isfinite(course.function.acceleration(t)) || grows(-near) || grows(near))
+        return faults_.add(path,
+                           fmt::format("has an acceleration without a bound at t = {:.6g} s, which takes as large "
+                                       "a load; round the corner, or give a profile (\"smooth\")",
+                                       t));
       if (std::abs(after - before) > 4 * near * bent + 1e-6 * fastest)
         return faults_.add(path, fmt::format("has a rate that jumps from {:.4g} to {:.4g} at t = {:.6g} s, which takes "
                                              "an impulse; round the corner, or give a profile (\"smooth\")",

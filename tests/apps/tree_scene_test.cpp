@@ -240,6 +240,10 @@ TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
   EXPECT_EQ(fault_of(good), "");
   // Zero but for round-off at each of the first looks: no pole, however steep between them.
   EXPECT_EQ(fault_of(with(good, "\"2*sin(t)\"", "\"sin(2*pi*4096*t)\"")), "");
+  EXPECT_EQ(fault_of(with(good, "\"2*sin(t)\"", "\"1/((t - 0.5)^2 + 1e-9)\"")), "");
+  // Corners of an acceleration are none of its poles.
+  EXPECT_EQ(fault_of(with(good, "\"0.1*t^2\", 0.2", "\"0.1*max(t - 0.2, 0)^2\", 0.2")), "");
+  EXPECT_EQ(fault_of(with(good, "\"0.1*t^2\", 0.2", "\"0.1*abs(t - 0.2)^3\", 0.2")), "");
   const struct {
     const char *old, *replacement, *words;
   } cases[] = {
@@ -247,8 +251,14 @@ TEST(TreeScene, FaultsNameTheirPlaceAndWhatWouldBeRight) {
       {"\"t*(t<1)\"", "\"sqrt(t - 0.5)\"", "is not a number at t = 0 s; it must have a finite value"},
       {"\"0.1*t^2\", 0.2", "\"0.1*min(t, 0.3)\", 0.2",
        "motion: has a rate that jumps from 0.1 to 0 at t = 0.3 s, which takes an impulse; round the corner"},
+      {"\"0.1*t^2\", 0.2", "\"0.1*sqrt(abs(t - 0.2))\", 0.2",
+       "motion: has an acceleration without a bound at t = 0.2 s"},
+      {"\"0.1*t^2\", 0.2", "\"0.1*abs(t - 0.2)^1.2\", 0.2", "motion: has an acceleration without a bound at t = 0.2 s"},
+      {"\"0.1*t^2\", 0.2", "\"0.1*abs(t - 0.2)^1.5\", 0.2", "motion: has an acceleration without a bound at t = 0.2 s"},
       {"\"0.1*t^2\", 0.2", "\"0.1*(t > 0.2)\", 0.2", "motion: jumps by 0.1 at t = 0.2 s; a joint cannot"},
       {"\"2*sin(t)\"", "\"tan(3.7*t)\"", "drive: grows without end near t = 1.273618"},
+      {"\"2*sin(t)\"", "\"tan(pi*t)\"", "drive: grows without end near t = 0.5 s"},  // a time that is looked at
+      {"\"2*sin(t)\"", "\"1/sin(pi*(t + 0.5))\"", "drive: grows without end near t = 0.5 s"},
       {"\"2*sin(t)\"", "\"1/(t - 0.2501234567)^2\"", "drive: grows without end near t = 0.25012345"},
       {"name = \"lift\"", "name = \"lvlh\"", "joints[0].name: \"lvlh\" is taken; choose another"},
       {"kind = \"slider\"", "kind = \"slide\"", "joints[0].kind: is \"slide\"; did you mean \"slider\"?"},
