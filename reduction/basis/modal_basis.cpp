@@ -69,11 +69,12 @@ int strainless(const VectorXd& strain, const VectorXd& round_off) {
   return count;
 }
 
-/// What the round-off of K changes of the frequencies of `basis`, relative. K and M: over the unknowns. Round-off is
-/// seen in phi^T K phi, less the strain energy. It mixes mode k with j by sqrt(n_j n_k) / (lambda_k - lambda_j), where
-/// n is that of an eigenvalue, and the quotient of strain energies changes by the square of that times the gap.
+/// What the round-off of K changes of the frequencies of `basis`, relative. K and M: over the unknowns; `solved`: the
+/// eigenvalues of the solver. Round-off is seen in phi^T K phi, less the strain energy, and in what the solver found.
+/// It mixes mode k with j by sqrt(n_j n_k) / (lambda_k - lambda_j), where n is that of an eigenvalue, and the quotient
+/// of strain energies changes by the square of that times the gap.
 VectorXd frequency_round_off(const ModalModel& model, const SparseMatrix& K, const SparseMatrix& M,
-                             const std::vector<int>& unknowns, const ModalBasis& basis) {
+                             const std::vector<int>& unknowns, const ModalBasis& basis, const VectorXd& solved) {
   constexpr double lucky = 3;  // times smaller than the round-off may be, seen in two energies by accident
   // A dense factor adds as many products as there are unknowns, and their round-off, which the energies do not show.
   const double sums = basis.summary.backend == "dense" ? std::sqrt(static_cast<double>(K.rows())) : 1;
@@ -82,7 +83,8 @@ VectorXd frequency_round_off(const ModalModel& model, const SparseMatrix& K, con
   const VectorXd by_K = quadratic_forms(K, Phi) / 2, may_be = sums / lucky * energy_round_off(model, basis.Phi);
   const VectorXd lambda = basis.omega.cwiseAbs2();
   const auto noise = [&](Index k) {
-    return std::max(std::abs(by_K(k) - strain(k)), may_be(k)) / strain(k) * lambda(k);
+    const double seen = std::max(std::abs(by_K(k) - strain(k)), may_be(k)) / strain(k) * lambda(k);
+    return std::max(seen, std::abs(solved(k) - lambda(k)));
   };
   VectorXd r = VectorXd::Zero(strain.size());
   for (Index k = basis.rigid_freedoms; k < r.size(); ++k) {
@@ -92,6 +94,13 @@ VectorXd frequency_round_off(const ModalModel& model, const SparseMatrix& K, con
       if (gap > 0) change += std::min(noise(k) * noise(j) / gap, gap);
     }
     r(k) = change / lambda(k);
+  }
+  // The solver tells modes in ascending order. A shape that stores more than a later one has parts of much higher
+  // modes.
+  double least = std::numeric_limits<double>::infinity();
+  for (Index k = r.size() - 1; k >= basis.rigid_freedoms; --k) {
+    least = std::min(least, lambda(k));
+    r(k) = std::max(r(k), lambda(k) / least - 1);
   }
   return r;
 }
@@ -192,7 +201,7 @@ ModalBasis modes_of(const ModalModel& model, const Clamp& clamp, const Reduced& 
   MatrixXd Phi = reduced.unknowns.expanded(pairs.Phi);
   const EigenSummary summary = with_equal_energies(model, Phi, pairs.lambda, pairs.summary, threads);
   ModalBasis basis = finished(model, std::move(Phi), masses_of, summary, options.num_modes, rigid, threads);
-  basis.round_off = frequency_round_off(model, reduced.K, reduced.M, reduced.unknowns.free_dofs(), basis);
+  basis.round_off = frequency_round_off(model, reduced.K, reduced.M, reduced.unknowns.free_dofs(), basis, pairs.lambda);
   basis.unknowns = count;
   basis.factor = pairs.factor;
   set_clamped_interface(basis, model.mesh, clamp);

@@ -19,6 +19,7 @@ constexpr int count = 8;
 
 struct Piece {
   double length, height = 0.03, end_height = 0.03, width = 0.012, end_width = 0.012;
+  int elements = 0;  // chosen
 };
 
 /// Modes of a boom of rectangles; `keys` of the body.
@@ -26,9 +27,9 @@ BoundedModes modes_of(const std::vector<Piece>& pieces, const std::string& keys,
   std::string text = "format = \"flexboom-body-1\"\nname = \"boom\"\ndirections = \"all\"\n" + keys;
   for (const Piece& p : pieces)
     text += fmt::format(
-        "\n[[segments]]\nshape = \"rectangle\"\nlength = {:.17g}\nheight = {}\nwidth = {}\n"
+        "\n[[segments]]\nshape = \"rectangle\"\nlength = {:.17g}\nheight = {}\nwidth = {}\nelements = {}\n"
         "end = {{ height = {}, width = {} }}\nmaterial = {{ E = 70e9, nu = 0.33, rho = 2700 }}",
-        p.length, p.height, p.width, p.end_height, p.end_width);
+        p.length, p.height, p.width, p.elements, p.end_height, p.end_width);
   const auto file = std::filesystem::temp_directory_path() / fmt::format("flexboom-bounded-{}.toml", ::getpid());
   std::ofstream(file) << text << "\n";
   const Model model = load_model(file, {});
@@ -60,6 +61,25 @@ TEST(BoundedModes, HoldHoweverShortAnElementIs) {
           EXPECT_EQ(known, count);
         }
       }
+}
+
+// A strip that carries a stiff bar and a heavy mass: its first frequency is 1e8 times below the highest of many
+// elements, so that shapes are lost in the round-off of K.
+TEST(BoundedModes, AreUnknownWhereShapesAreLost) {
+  const auto modes = [](int elements, const std::string& backend) {
+    return modes_of({{0.3, 5e-5, 5e-5, 1e-3, 1e-3, elements}, {0.3, 0.01, 0.01, 0.01, 0.01, elements}},
+                    "attachments = [{ name = \"m\", position = \"tip\", mass = 10, offset = [0, 0.03, 0] }]", backend);
+  };
+  const BoundedModes coarse = modes(4, "auto");
+  EXPECT_LT(coarse.bounds.relative[0], 1e-6);
+  int lost = 0;
+  for (const int elements : {20, 40, 60})
+    for (const char* backend : {"block", "arpack", "spectra"}) {
+      const BoundedModes fine = modes(elements, backend);
+      lost += std::abs(fine.basis.omega[0] / coarse.basis.omega[0] - 1) > 0.1;
+      expect_bounds_hold(fine, coarse.basis.omega, fmt::format("{} elements, {}", elements, backend));
+    }
+  EXPECT_GT(lost, 0);
 }
 
 TEST(BoundedModes, HoldOfSteepTapers) {
