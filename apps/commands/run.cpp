@@ -123,6 +123,14 @@ void take_model(BodyScene& b, const BodyScene& planned) {
     b.geometry.segments[i].elements = planned.geometry.segments[i].elements;
 }
 
+/// Are their modes, wanted in equal numbers from equal elements, others?
+bool have_other_modes(BodyScene a, const BodyScene& b) {
+  take_model(a, b);
+  a.stiffening = b.stiffening, a.backend = b.backend;
+  a.damping = b.damping, a.other_damping = b.other_damping;
+  return to_toml(a) != to_toml(b);
+}
+
 /// Bodies get the modes, elements and stiffening that they have in another scene of the same bodies. The integrator
 /// gets the tolerance that it has there.
 void take_plan(Scene& scene, const std::filesystem::path& from) {
@@ -150,9 +158,7 @@ void take_plan(Scene& scene, const std::filesystem::path& from) {
       scene.warnings.push_back(fmt::format("--plan: body {} has {} as in {}, not as the scene says", b.name,
                                            fmt::join(replaced, ", "), from.string()));
     take_model(b, *p);
-    BodyScene same = *p;  // but for what changes no mode
-    same.damping = b.damping, same.backend = b.backend, same.stiffening = b.stiffening;
-    if (to_toml(same) != to_toml(b))
+    if (have_other_modes(b, *p))
       scene.warnings.push_back(fmt::format(
           "--plan: body {} is another one in {}: its modes are chosen by their places in the order of frequencies, "
           "which may be other modes here; an error budget shows what that costs, and without --plan they are chosen "
@@ -191,13 +197,9 @@ void warn_of_changes(Scene& scene, const std::filesystem::path& folder) {
   for (const BodyScene& b : scene.bodies) {
     const auto p = std::ranges::find(before.bodies, b.name, &BodyScene::name);
     if (!b.is_boom() || !b.is_elastic() || p == before.bodies.end()) continue;
-    BodyScene same = *p;  // but for what the state says itself, and what changes no coordinate's meaning
-    same.modes = b.modes, same.modes_auto = b.modes_auto, same.shapes = b.shapes;
-    same.directions = b.directions, same.directions_given = b.directions_given;
-    same.damping = b.damping, same.other_damping = b.other_damping;
-    same.stiffening = b.stiffening, same.solid = b.solid, same.geometry.order = b.geometry.order;
-    same.basis.corrections = b.basis.corrections, same.basis.motion = b.basis.motion;
-    if (to_toml(same) != to_toml(b)) warn("body", b.name);
+    BodyScene same = *p;
+    same.basis.motion = b.basis.motion;  // that of the state comes with it
+    if (have_other_modes(same, b)) warn("body", b.name);
   }
   const auto is_same = [](const PlaceScene& a, const PlaceScene& b) {
     return a.body == b.body && a.marker == b.marker && a.point.isApprox(b.point) && a.axes().isApprox(b.axes());
@@ -324,6 +326,9 @@ RunResult run_into(ResultsFolder& results, const Scene& scene, const RunArgument
     results.write(r);
     if (a.report) write_report(results.path());
     return r;
+  } catch (const InputError& e) {
+    results.refuse(e.what());
+    throw;
   } catch (const std::exception& e) {
     results.fail(e.what());
     if (a.report) try_to_report(results.path());

@@ -109,6 +109,21 @@ Head head_of(const fs::path& path, bool keep_text, const std::function<bool(doub
   return head;
 }
 
+constexpr const char* earlier = ".earlier";  // folder of the files that a run finds, until it has some of its own
+
+/// Those of a run that are there, and those that a killed one left half written.
+std::vector<fs::path> files_of_runs(const fs::path& folder) {
+  std::error_code ignored;
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const fs::path file = entry.path().filename();
+    const std::string name = (file.extension() == ".part" ? file.stem() : file).string();
+    if (std::ranges::find(result_files, name) != result_files.end() || is_motion_frame(name))
+      files.push_back(entry.path());
+  }
+  return files;
+}
+
 bool on_grid(double t, double step) {
   const double k = t / step;
   return std::abs(k - std::round(k)) <= 1e-12 * std::max(1.0, k);
@@ -128,6 +143,8 @@ ResultsFolder::ResultsFolder(fs::path path, const Scene& scene, const fs::path& 
   summary_ = {{"scene", scene.name}, {"version", version}, {"status", "running"}, {"process", getpid()}};
   if (goes_on_) return;
   begun_ = true;
+  // What a run that was killed before its first row had set aside is still there.
+  if (fs::exists(path_ / "trajectory.csv")) set_aside();
   clear();
   write_file(path_ / "scene.toml", to_toml(scene));
   write_summary();
@@ -136,14 +153,32 @@ ResultsFolder::ResultsFolder(fs::path path, const Scene& scene, const fs::path& 
 /// Nothing of an older run stays, nor what a killed one left half written.
 void ResultsFolder::clear() {
   std::error_code ignored;
-  for (const char* name : result_files)
-    for (const char* part : {"", ".part"}) fs::remove(path_ / (std::string(name) + part), ignored);
-  std::vector<fs::path> frames;
-  for (const auto& entry : fs::directory_iterator(path_, ignored)) {
-    const fs::path name = entry.path().filename();
-    if (is_motion_frame((name.extension() == ".part" ? name.stem() : name).string())) frames.push_back(entry.path());
+  for (const fs::path& file : files_of_runs(path_)) fs::remove(file, ignored);
+}
+
+void ResultsFolder::set_aside() {
+  std::error_code error;
+  fs::remove_all(path_ / earlier, error);
+  fs::create_directory(path_ / earlier, error);
+  for (const fs::path& file : files_of_runs(path_))
+    if (!error) fs::rename(file, path_ / earlier / file.filename(), error);
+}
+
+void ResultsFolder::let_go() {
+  std::error_code ignored;
+  fs::remove_all(path_ / earlier, ignored);
+  has_rows_ = true;
+}
+
+void ResultsFolder::refuse(const std::string& why) noexcept {
+  std::error_code error;
+  if (!begun_ || has_rows_ || !fs::exists(path_ / earlier, error)) return fail(why);
+  try {
+    clear();
+    for (const fs::path& file : files_of_runs(path_ / earlier)) fs::rename(file, path_ / file.filename());
+    fs::remove_all(path_ / earlier);
+  } catch (const std::exception&) {  // they stay where they are
   }
-  for (const fs::path& frame : frames) fs::remove(frame, ignored);
 }
 
 /// What stays of the flight that this one goes on from: all that came before its start.
@@ -177,6 +212,7 @@ void ResultsFolder::write_rows(std::ostream& out, const OutputTable& table, size
 
 void ResultsFolder::add(const RunResult& r, size_t first) {
   if (!begun_) begin(r);
+  let_go();
   const fs::path rows = path_ / "trajectory.csv", events = path_ / "events.csv";
   const std::vector<StopEvent>& all = r.motion.events;
   if (first == 0) {
@@ -201,6 +237,7 @@ void ResultsFolder::add(const RunResult& r, size_t first) {
 
 void ResultsFolder::write(const RunResult& r) {
   const Stopwatch watch;
+  let_go();
   const fs::path rows = path_ / "trajectory.csv";
   write_file(path_ / "scene.toml", to_toml(r.scene));
   write_file(rows, [&](std::ostream& out) {

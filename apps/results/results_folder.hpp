@@ -32,12 +32,18 @@ class ResultsFolder {
   /// summary.json says that the run failed, and why. Never throws: it is called because of an error.
   void fail(const std::string& why) noexcept;
 
+  /// The run was refused before it had a row: what was in the folder is as it was. Where nothing was, or there are
+  /// rows, as fail().
+  void refuse(const std::string& why) noexcept;
+
   /// What summary.json says.
   const nlohmann::ordered_json& summary() const { return summary_; }
   const std::filesystem::path& path() const { return path_; }
 
  private:
   void clear();
+  void set_aside();
+  void let_go();
   void begin(const RunResult&);
   void write_rows(std::ostream&, const OutputTable&, size_t first) const;
   void write_summary();
@@ -46,6 +52,7 @@ class ResultsFolder {
   std::filesystem::path path_;
   bool goes_on_;              // from this folder
   bool begun_ = false;        // files here are this run's
+  bool has_rows_ = false;     // and rows are among them
   bool skips_first_ = false;  // row 0 of the flight lies off the grid of outputs of the whole
   double start_ = 0;          // [s]
   std::unique_ptr<FolderLock> lock_;

@@ -161,6 +161,20 @@ class Failed(Case):
         self.assertEqual((len(rows), float(rows[-1][0])), (22, 0.2))
         self.assertEqual(self.state_time(out), 0.2)
 
+    def test_a_run_that_is_refused_late_leaves_the_folder_as_it_was(self):
+        """Its state is that of another scene, which shows when the bodies are made."""
+        out = self.run_sport("--duration", "0.3", "--report", "--vtu-step", "0.1")
+        other = self.folder / "other"
+        self.assert_exit(OK, flexboom("run", "two-link-arm", "--no-budget", "--duration", "0.1", "--out", other))
+        files = {f: (out / f).read_bytes() for f in os.listdir(out)}
+        result = flexboom("run", "sport", "--no-budget", "--continue", other, "--out", out)
+        self.assert_exit(INPUT, result)
+        self.assertIn("is of another scene", result.stderr)
+        self.assertEqual({f: (out / f).read_bytes() for f in os.listdir(out)}, files)
+        empty = self.folder / "empty"  # where nothing was, the folder says what came of the run
+        self.assert_exit(INPUT, flexboom("run", "sport", "--no-budget", "--continue", other, "--out", empty))
+        self.assertEqual(self.summary(empty)["status"], "failed")
+
     def test_a_full_disk_is_an_error_and_the_folder_says_so(self):
         out = self.folder / "out"
         result = subprocess.run(
