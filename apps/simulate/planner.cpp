@@ -380,7 +380,13 @@ bool Planner::choose_from_more(Scene& scene, const OutputErrors& worst, const Ru
   return has_chosen;
 }
 
-bool Planner::take_finer_elements(Scene& scene, const OutputErrors& worst, std::vector<std::string>& plan) const {
+bool Planner::take_finer_elements(Scene& scene, const OutputErrors& worst, std::vector<std::string>& plan) {
+  const double before = std::exchange(discretisation_, worst.discretisation);
+  if (worst.discretisation > before / 2) {
+    plan.push_back(fmt::format("discretisation: {:.1e} in {}; finer elements are not tried: they hardly change it",
+                               worst.discretisation, worst.name));
+    return false;
+  }
   Scene better = scene;
   for (const size_t i : open_) {
     BodyScene& b = better.bodies[i];

@@ -64,7 +64,7 @@ class Planner {
   /// Of the outputs that more modes or finer elements may mend; nullptr: those are within the tolerance.
   const OutputErrors* worst_to_mend(const Scene&, const ErrorBudget&, std::vector<std::string>& plan) const;
   bool choose_from_more(Scene&, const OutputErrors& worst, const RunHooks&, std::vector<std::string>& plan);
-  bool take_finer_elements(Scene&, const OutputErrors& worst, std::vector<std::string>& plan) const;
+  bool take_finer_elements(Scene&, const OutputErrors& worst, std::vector<std::string>& plan);
   Scene with_first(const Scene& all, const std::vector<Candidate>&, size_t count) const;
 
   void warn_of_tones(const Scene& given, Scene& chosen, const RunHooks&) const;
@@ -84,7 +84,8 @@ class Planner {
   bool is_timed_ = false;        // the scene has the tolerance that its integrator needs
   bool costly_ = false;          // more candidates are not bearable
   bool hopeless_ = false;        // nearly all are needed, and without the last of them errors are far too large
-  double truncation_ = unknown;  // of the last step
+  double truncation_ = unknown;  // of the last step that was to make it less
+  double discretisation_ = unknown;
 };
 
 }  // namespace flexboom
