@@ -37,9 +37,9 @@ struct SolidOptions {
 SolidOptions chosen(const BeamGeometry&, const SolidOptions&);
 
 /// A mesh of hexahedra "hex" that is `steps` steps finer than a complete one (`chosen`), coarser where negative. A step
-/// raises the order and the refinement of singular rims by one, where there is any; beyond the highest order it halves
-/// all elements. "hex8", "hex20", "tet10" and their like have no finer mesh of their own kind: their step leads to
-/// "hex" on the same grading. Empty: there is none so coarse.
+/// raises the order and the refinement of singular rims by one; beyond the highest order it halves all elements.
+/// "hex8", "hex20", "tet10" and their like have no finer mesh of their own kind: their step leads to "hex" on the same
+/// grading. Empty: there is none so coarse.
 std::optional<SolidOptions> refined(const SolidOptions& complete, int steps);
 
 /// Hexahedra (or tetrahedra from cutting them) on the exact geometry of a boom, in the axes of BeamGeometry. Inside an

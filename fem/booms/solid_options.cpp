@@ -174,7 +174,7 @@ std::optional<SolidOptions> refined(const SolidOptions& complete, int steps) {
   SolidGrading& g = r.grading;
   for (; r.order > max_solid_order; --r.order) g.sectors *= 2, g.rings *= 2, g.long_elements *= 2;
   constexpr int most_levels = 20;
-  if (g.corner_levels > 0) g.corner_levels = std::clamp(g.corner_levels + steps, 1, most_levels);
+  g.corner_levels = std::clamp(g.corner_levels + steps, std::min(g.corner_levels, 1), most_levels);
   return r;
 }
 
