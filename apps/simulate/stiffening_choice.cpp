@@ -114,10 +114,8 @@ void note_unseen_stiffening(const Multibody& whole, const std::vector<Stiffening
     if (!held[i] || choice[i] == Stiffening::on || !has_stiffening(body)) continue;
     effect[i].size = std::numeric_limits<double>::quiet_NaN();
     warnings.push_back(fmt::format(
-        "body {}: a joint that closes a loop or a spring holds it at both ends, and without geometric stiffness it "
-        "carries "
-        "no load by being held from getting shorter as it bends; what that changes is not known, and stiffening = "
-        "\"auto\" has it",
+        "body {}: a joint that closes a loop or a spring holds it at both ends, and without geometric stiffness that "
+        "stretches it by no load as it bends; what this changes is not known, and stiffening = \"auto\" has it",
         body.name));
   }
 }
