@@ -139,15 +139,14 @@ bool Contacts::has_decayed(std::size_t i, Gap gap, StopMotion& motion) {
   return std::abs(push.acceleration) * period * period <= 2 * asleep_[i] + push.open * period * period;
 }
 
-/// Is a crossing but noise of a joint that rests on its stop? What pushes it turns it back then, before it is farther
-/// away than its place is known. At one time that is said once: a search that finds the crossing again is right.
+/// Is the wrong side but noise of a joint that rests on its stop? What pushes it turns it back then, before it is
+/// farther away than its place is known. Only where no crossing was found: a search would go on finding it.
 bool Contacts::comes_back(std::size_t i, Gap gap, double t, StopMotion& motion) {
   constexpr double slow = 1e-6;  // faster ones are looked at no further
   const double known = std::min(100 * motion.noise(i), on_stop);
-  if (!(std::abs(gap.rate) * stops_[i].period < slow && std::abs(gap.value) < known) || t == came_back_[i])
-    return false;
-  const bool is_outwards = crossed_[i] != 0 ? crossed_[i] < 0 : gap.value < 0;
-  const double back = (is_outwards ? 1 : -1) * motion.push(i, closed_).acceleration;
+  const bool is_small = std::abs(gap.rate) * stops_[i].period < slow && std::abs(gap.value) < known;
+  if (crossed_[i] != 0 || !is_small || t == came_back_[i]) return false;
+  const double back = (gap.value < 0 ? 1 : -1) * motion.push(i, closed_).acceleration;
   if (!(gap.rate * gap.rate < 2 * back * known)) return false;
   came_back_[i] = t;
   return true;
