@@ -10,7 +10,9 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double on_stop = 4e-16;  // as near as a place is known [rad] or [m]
+constexpr double on_stop = 4e-16;   // as near as a place is known [rad] or [m]
+constexpr double one_time = 1e-12;  // relative: times this close are one
+constexpr double slow = 1e-6;       // ways within a period on the stop that may be round-off [rad] or [m]
 
 }  // namespace
 
@@ -43,7 +45,9 @@ Contacts::Contacts(std::vector<Stop> stops, const FlightOptions& options, std::s
       crossed_(stops_.size(), 0),
       approach_(stops_.size()),
       asleep_(stops_.size(), 0.0),
-      came_back_(stops_.size(), -1) {
+      came_back_(stops_.size(), -1),
+      met_(stops_.size(), -1),
+      held_(stops_.size(), 0) {
   for (std::size_t i = 0; i < size(); ++i) {
     armed_[i] = stops_[i].is_there && history_[stops_[i].joint].settled < 0;
     approach_[i] = Approach(history_[stops_[i].joint].sides);
@@ -70,7 +74,11 @@ bool Contacts::update(StopMotion& motion, double t, std::vector<StopEvent>& even
     history.largest_rate = std::max(history.largest_rate, std::abs(gap.rate));
     history.largest_gap = std::max(history.largest_gap, std::abs(gap.value));
     if (!stops_[i].is_there) continue;
-    const bool slipped = slipped_through(i, gap, motion.noise(i));
+    const bool slipped = slipped_through(i, gap, held_[i] != 0 ? std::max(motion.noise(i), on_stop) : motion.noise(i));
+    if (held_[i] != 0 && std::abs(gap.value) > on_stop) {
+      held_[i] = 0;
+      changed = true;
+    }
     if (!armed_[i]) {
       if (crossed_[i] != 0 || std::max(std::abs(gap.rate) * stops_[i].period, gap.value) > level(i, motion)) {
         wake(i, gap);
@@ -82,7 +90,10 @@ bool Contacts::update(StopMotion& motion, double t, std::vector<StopEvent>& even
         settle(i, t);
       } else if (comes_back(i, gap, t, motion)) {
         motion.put_on_stop(i);
+      } else if (trembles(i, gap, t)) {
+        hold(i, events, motion);
       } else {
+        met_[i] = t;
         closed_[i] = slipped ? gap.value > 0 : crossed_[i] > 0;
         if (!slipped) motion.put_on_stop(i);  // exactly: the root is good to round-off of t
         events.push_back({t, static_cast<int>(stops_[i].joint), closed_[i] != 0, gap.rate});
@@ -97,7 +108,7 @@ bool Contacts::update(StopMotion& motion, double t, std::vector<StopEvent>& even
 }
 
 double Contacts::level(std::size_t i, const StopMotion& motion) const {
-  if (!stops_[i].is_there) return no_level;
+  if (!stops_[i].is_there || held_[i] != 0) return no_level;
   return armed_[i] ? 0 : 2 * std::max(small(i, motion), asleep_[i]);
 }
 
@@ -142,7 +153,6 @@ bool Contacts::has_decayed(std::size_t i, Gap gap, StopMotion& motion) {
 /// Is the wrong side but noise of a joint that rests on its stop? What pushes it turns it back then, before it is
 /// farther away than its place is known. Only where no crossing was found: a search would go on finding it.
 bool Contacts::comes_back(std::size_t i, Gap gap, double t, StopMotion& motion) {
-  constexpr double slow = 1e-6;  // faster ones are looked at no further
   const double known = std::min(100 * motion.noise(i), on_stop);
   const bool is_small = std::abs(gap.rate) * stops_[i].period < slow && std::abs(gap.value) < known;
   if (crossed_[i] != 0 || !is_small || t == came_back_[i]) return false;
@@ -150,6 +160,23 @@ bool Contacts::comes_back(std::size_t i, Gap gap, double t, StopMotion& motion) 
   if (!(gap.rate * gap.rate < 2 * back * known)) return false;
   came_back_[i] = t;
   return true;
+}
+
+/// Has a crossing brought a joint back to the stop that it met or left but round-off before?
+bool Contacts::trembles(std::size_t i, Gap gap, double t) const {
+  return crossed_[i] != 0 && std::abs(gap.rate) * stops_[i].period < slow && std::abs(t - met_[i]) <= one_time * t;
+}
+
+/// A joint that is pushed off its stop, or into it, from rest is within round-off of it for a while. Where it goes is
+/// decided by the push, and there it is looked at again. The event before was round-off, as this one is.
+void Contacts::hold(std::size_t i, std::vector<StopEvent>& events, StopMotion& motion) {
+  const auto joint = static_cast<int>(stops_[i].joint);
+  const auto before = std::find_if(events.rbegin(), events.rend(),
+                                   [&](const StopEvent& e) { return e.joint == joint && e.kind == EventKind::stop; });
+  if (before != events.rend() && before->time == met_[i]) events.erase(std::next(before).base());
+  motion.put_on_stop(i);
+  closed_[i] = motion.push(i, closed_).acceleration > 0;
+  held_[i] = 1;
 }
 
 /// Does something push a joint that is on its stop, so that it will not stay there? One that is pressed against its

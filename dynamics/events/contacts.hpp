@@ -102,6 +102,8 @@ class Contacts {
   bool slipped_through(std::size_t i, Gap, double noise) const;
   bool has_decayed(std::size_t i, Gap, StopMotion&);
   bool comes_back(std::size_t i, Gap, double t, StopMotion&);
+  bool trembles(std::size_t i, Gap, double t) const;
+  void hold(std::size_t i, std::vector<StopEvent>&, StopMotion&);
   bool is_pushed(std::size_t i, StopMotion&) const;
   double small(std::size_t i, const StopMotion&) const;
   void settle(std::size_t i, double t);
@@ -115,6 +117,8 @@ class Contacts {
   std::vector<Approach> approach_;
   std::vector<double> asleep_;     // ways below this do not wake a joint that has settled on its way [rad] or [m]
   std::vector<double> came_back_;  // when it last did [s]; or -1
+  std::vector<double> met_;        // time of the last crossing [s]; or -1
+  std::vector<char> held_;         // not looked at as long as it is on its stop but for round-off
   ChatterGuard chatter_;
 };
 

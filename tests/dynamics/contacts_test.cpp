@@ -63,5 +63,37 @@ TEST(Contacts, RoundOffIsNoneWhereWhatPushesTurnsItBack) {
   EXPECT_EQ(events_of(1e-9, -3).size(), 1u);        // a crossing that was found
 }
 
+// A load sets in on a joint at rest on its stop: crossings that are found are round-off until it has moved away.
+TEST(Contacts, AJointThatTremblesOnItsStopGoesWhereItIsPushed) {
+  for (const double side : {-1., 1.}) {
+    FlightOptions options;
+    Contacts contacts({{0, "hinge", true, 0.01, 1}}, options, 1);
+    OneStop motion;
+    motion.rate = 1;  // in motion before, beyond its stop
+    contacts.begin(motion);
+    std::vector<StopEvent> events;
+    motion.rate = -1e-9, motion.acceleration = 3 * side;
+    contacts.crossed()[0] = -1;
+    contacts.update(motion, 10, events);
+    ASSERT_EQ(events.size(), 1u);
+    motion.rate = 1e-9;
+    contacts.crossed()[0] = 1;
+    contacts.update(motion, 10 + 2e-13, events);
+    EXPECT_TRUE(events.empty());
+    EXPECT_EQ(contacts.closed()[0] != 0, side > 0);
+    EXPECT_EQ(contacts.level(0, motion), no_level);
+    contacts.crossed()[0] = 0;
+    motion.place = 1e-15 * side;  // away from it: it is looked at again
+    EXPECT_TRUE(contacts.update(motion, 10 + 1e-8, events));
+    EXPECT_TRUE(events.empty());
+    EXPECT_EQ(contacts.level(0, motion), 0);
+    contacts.crossed()[0] = side > 0 ? -1 : 1;
+    motion.place = 0, motion.rate = -0.1 * side;
+    contacts.update(motion, 11, events);
+    ASSERT_EQ(events.size(), 1u);
+    EXPECT_EQ(events[0].contact, side < 0);
+  }
+}
+
 }  // namespace
 }  // namespace flexboom
