@@ -2,6 +2,7 @@
 
 #include "apps/base/deflection.hpp"
 #include "apps/model/static_shapes.hpp"
+#include "apps/scene/wanted_accuracy.hpp"
 #include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/field_error.hpp"
 #include "apps/simulate/flights_ahead.hpp"
@@ -29,6 +30,15 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
+namespace {
+
+bool wants_loads(const Scene& scene) {
+  if (scene.outputs.empty()) return std::ranges::any_of(scene.joints, &JointScene::loads) || !scene.springs.empty();
+  return std::ranges::any_of(scene.outputs, [](const std::string& text) { return is_load(wanted_output(text).name); });
+}
+
+}  // namespace
+
 IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, std::string_view chosen,
                                      long max_steps) {
   IntegratorOptions o;
@@ -36,6 +46,7 @@ IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, 
   o.tolerance = scene.step_tolerance();
   o.accuracy = scene.tolerance;
   if (scene.from) o.start = scene.from->time(), o.largest = scene.from->largest();
+  o.loads = !scene.error_budget && wants_loads(scene);  // else the budget measures them
   o.duration = scene.duration;
   o.output_step = scene.output_step;
   o.settle = scene.settle;

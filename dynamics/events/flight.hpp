@@ -42,6 +42,7 @@ struct MotionScales {
 /// What every flight is asked for, whatever the coordinates and the method.
 struct FlightOptions {
   double tolerance = 1e-6;    // relative error wanted in every output (max over time / max of the output)
+  bool loads = false;         // are loads of joints to have that error, too? They are made of accelerations
   double start = 0;           // [s]
   double duration = 10;       // [s], the time at the end
   double output_step = 0.01;  // [s]

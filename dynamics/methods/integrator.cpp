@@ -18,11 +18,13 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr std::array<IntegratorMethod, 5> methods = {{
-    {"exponential", "exact in the linear part, collocation of order 8 in the rest", 0.1, nullptr, make_exponential},
-    {"bdf", "CVODE backward differentiation, order 1-5, Newton with the exact Jacobian", 0.005, make_cvode_bdf},
-    {"adams", "CVODE Adams-Moulton, order 1-12, Newton with the exact Jacobian", 0.001, make_cvode_adams},
-    {"dirk", "ARKODE implicit Runge-Kutta, order 5, Newton with the exact Jacobian", 0.005, make_arkode_implicit},
-    {"erk", "ARKODE explicit Runge-Kutta, order 6", 0.01, make_arkode_explicit},
+    {"exponential", "exact in the linear part, collocation of order 8 in the rest", 0.1, 0.1, nullptr,
+     make_exponential},
+    {"bdf", "CVODE backward differentiation, order 1-5, Newton with the exact Jacobian", 0.005, 0.0005, make_cvode_bdf},
+    {"adams", "CVODE Adams-Moulton, order 1-12, Newton with the exact Jacobian", 0.001, 0.001, make_cvode_adams},
+    {"dirk", "ARKODE implicit Runge-Kutta, order 5, Newton with the exact Jacobian", 0.005, 0.0005,
+     make_arkode_implicit},
+    {"erk", "ARKODE explicit Runge-Kutta, order 6", 0.01, 0.01, make_arkode_explicit},
 }};
 
 }  // namespace

@@ -78,6 +78,8 @@ struct IntegratorMethod {
   /// Part of the tolerance wanted over a whole run that each step is asked for. Errors of undamped motion grow with its
   /// periods, so this is a start, not a promise: a run's error budget measures what was reached.
   double local_share;
+  double local_share_of_loads;  // the same where loads of joints are wanted: low orders know accelerations worst
+  double share_of(const FlightOptions& o) const { return o.loads ? local_share_of_loads : local_share; }
   /// One of the two is null.
   std::unique_ptr<Stepper> (*make)(std::unique_ptr<Ode>, const ErrorScale&);
   std::unique_ptr<Stepper> (*make_split)(std::unique_ptr<SplitProblem>, const ErrorScale&) = nullptr;

@@ -24,7 +24,7 @@ using namespace redundant;
 namespace {
 
 /// Part of the tolerance wanted over a run that each step is asked for.
-constexpr double local_share = 0.015;
+constexpr double local_share = 0.015, local_share_of_loads = 0.0015;
 /// A violation of a joint at the start beyond this [m, rad, their rates] is the caller's mistake.
 constexpr double open_joint = 1e-8;
 
@@ -58,7 +58,8 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     const double soon = t_ + 1e-14 * options.duration;  // what jumps at the start has jumped
     equations_.make_consistent(soon, y_, y_dot_, memory_);
     const double shaking = std::max(balance_of(equations_, y_, memory_).shaking(), options_.largest.shaking);
-    scales_ = std::make_unique<StateScales>(equations_, y_, y_dot_, shaking, local_share * options.tolerance,
+    scales_ = std::make_unique<StateScales>(equations_, y_, y_dot_, shaking,
+                                            (options.loads ? local_share_of_loads : local_share) * options.tolerance,
                                             options.duration);
     make_method();
   }

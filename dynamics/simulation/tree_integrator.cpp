@@ -65,7 +65,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
              const Checkpoint<TreeTrajectory>& so_far, const StiffeningLook& look, Pilot* pilot = nullptr)
       : Flight(options, so_far, stops_of(tree), tree.scene().joints.size(), Laws(tree.scene().joints, options)),
         tree_(tree),
-        scales_(tree, y0, method.local_share * options.tolerance, options.rescale_at_events),
+        scales_(tree, y0, method.share_of(options) * options.tolerance, options.rescale_at_events),
         ode_(ode_of(tree, laws_)),
         stepper_(method.make != nullptr ? method.make(ode_of(tree, laws_), scales_.error())
                                         : method.make_split(split(tree), scales_.error())),
