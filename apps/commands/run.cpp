@@ -116,6 +116,7 @@ void take_model(BodyScene& b, const BodyScene& planned) {
   b.modes = planned.modes, b.shapes = planned.shapes, b.directions = planned.directions;
   b.modes_auto = planned.modes_auto, b.directions_given = planned.directions_given;
   b.basis.corrections = planned.basis.corrections;
+  if (b.basis.name != planned.basis.name) b.basis = planned.basis;
   b.solid = planned.solid, b.geometry.order = planned.geometry.order;
   if (b.stiffening == "auto") b.stiffening = planned.stiffening;
   if (b.geometry.segments.size() != planned.geometry.segments.size()) return;
@@ -147,7 +148,7 @@ void take_plan(Scene& scene, const std::filesystem::path& from) {
                                    toml_reader::question(b.name, names), fmt::join(names, "\", \"")));
     }
     require(
-        b.basis.name == p->basis.name,
+        b.basis.name == p->basis.name || !b.basis_given,
         fmt::format("--plan: body {} has the basis \"{}\" here and \"{}\" in {}, whose modes are others; drop --plan",
                     b.name, b.basis.name, p->basis.name, from.string()));
     require(

@@ -251,6 +251,7 @@ void model_keys(Archive& a, BodyScene& b) {
     b.modes = static_cast<int>(modes.number), b.modes_auto = modes.word == "auto";
     b.modes_given = b.modes_given || reader->has("modes");
     b.directions_given = b.directions_given || reader->has("directions");
+    b.basis_given = b.basis_given || reader->has("basis");
   }
   if (a.use() != Use::write || b.directions_given || !b.modes_auto)  // a plan has those that are not given
     a.choice({"directions", "", "modes that count, bending along y or all"}, directions, b.directions);

@@ -43,6 +43,7 @@ struct BodyScene {
   std::vector<int> shapes;                 // which of the modes stand for the body, from 1; empty: all
   std::string directions = "hinge-plane";  // modes that count: "hinge-plane" (bending along y) or "all"
   bool directions_given = false;           // by the file
+  bool basis_given = false;                // by the file
   BasisOptions basis;                      // its names and places; modes, plane and backend are those of the body
   BeamGeometry geometry;
   SolidOptions solid;            // [solid], how structure = "solid" is meshed

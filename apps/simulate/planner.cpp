@@ -4,6 +4,7 @@
 
 #include "apps/model/prepared_body.hpp"
 #include "apps/model/static_shapes.hpp"
+#include "apps/simulate/basis_choice.hpp"
 #include "apps/simulate/error_budget.hpp"
 #include "apps/simulate/fewest_enough.hpp"
 #include "apps/simulate/flights_ahead.hpp"
@@ -33,7 +34,7 @@ namespace {
 
 constexpr double unmoved = 1e-12;    // of the largest displacement: round-off of one that is zero
 constexpr int most_candidates = 96;  // per body
-constexpr int fewest = 4;            // candidates per body
+constexpr int fewest = few_modes;    // candidates per body
 constexpr int for_budget = 8;        // modes beside the candidates that show their truncation
 constexpr int most_rounds = 5;       // improvements
 constexpr double not_near = 10;      // times the tolerance: more modes that hardly help do not get there
@@ -155,7 +156,7 @@ Scene Planner::with_first(const Scene& all, const std::vector<Candidate>& list, 
 std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene& open, Scene& all,
                                      std::vector<std::string>& plan) {
   Scene with_few = with_candidates(scene, fewest, candidates_, hooks);
-  Run few = run_once(with_few, hooks);
+  Run few = fly(with_few, hooks);
   const auto made_ready = [&](int candidates) {
     open = with_candidates(scene, candidates, candidates, hooks);
     all = with_a_digit_more(as_flown(open, few));  // errors of its time are no part of differences
@@ -195,10 +196,39 @@ std::optional<Run> Planner::with_all(Scene& scene, const RunHooks& hooks, Scene&
   return run(fewest, 0);
 }
 
+Scene Planner::with_first_of_whole(Scene scene, size_t modes) const {
+  for (const size_t i : open_)
+    if (BodyScene& b = scene.bodies[i]; !has_choice(scene, b.name))
+      b.modes = std::min(b.modes, static_cast<int>(modes));
+  return scene;
+}
+
+size_t Planner::most_of_whole(const Scene& scene) const {
+  int most = 0;
+  for (const size_t i : open_)
+    if (const BodyScene& b = scene.bodies[i]; !has_choice(scene, b.name)) most = std::max(most, b.modes);
+  return static_cast<size_t>(most);
+}
+
+void Planner::choose_bases(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) const {
+  long bearable = 0;  // not known yet
+  const auto flown = [&](const Scene& of, int modes) {
+    const Scene tried = with_candidates(of, modes, std::max(candidates_, modes), hooks);
+    Run run = run_once(tried, hooks, 0, bearable);
+    if (bearable == 0) keep_flown(tried, run, hooks), bearable = bearable_steps(run);
+    return run;
+  };
+  try {
+    take_modes_of_the_motion(scene, open_, flown, plan);
+  } catch (const NumericalError&) {  // its modes at rest fly as well as they can
+  }
+}
+
 bool Planner::choose(Scene& scene, const RunHooks& hooks, std::vector<std::string>& plan) {
   if (open_.empty()) return false;
   const Scene given = scene;
   std::optional<Scene> cheap = by_cheapest_means(scene);
+  if (chosen_from_ == 0) choose_bases(cheap ? *cheap : scene, hooks, plan);
   const bool has_chosen = choose_as_flown(cheap ? *cheap : scene, hooks, plan);
   if (cheap) {
     cheap->formulation = scene.formulation, cheap->integrator = scene.integrator;
@@ -288,14 +318,27 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
   }
   give_up_ahead(hooks);
   kept_ = search.enough();
-  const Scene chosen = with_first(open, list, kept_);
+  const Scene best = with_first(all, list, kept_);
+  const size_t most = most_of_whole(all);
+  FewestEnough of_whole(std::vector<double>(most, 1.0), bearable, too_few_of_whole_, 2);
+  while (!of_whole.is_settled() && !hooks.stopped())
+    of_whole.tell(error_of(with_first_of_whole(best, of_whole.next())));
+  kept_of_whole_ = of_whole.enough();
+  const Scene chosen = with_first_of_whole(with_first(open, list, kept_), kept_of_whole_);
   for (const size_t i : open_) {
     const BodyScene& b = scene.bodies[i] = chosen.bodies[i];
-    plan.push_back(has_choice(all, b.name) ? words_of_choice(b.name, list, moved, search.error())
-                                           : fmt::format("{}: {} modes; the basis \"{}\" has no choice of them", b.name,
-                                                         b.modes, b.basis.name));
+    plan.push_back(has_choice(all, b.name)
+                       ? words_of_choice(b.name, list, moved, search.error())
+                       : fmt::format("modes of {}: the first {} of basis \"{}\"; left out: {} that "
+                                     "change the outputs by {:.1e} together with those of all bodies",
+                                     b.name, b.modes, b.basis.name, most - kept_of_whole_, of_whole.error()));
   }
-  return Choice{moved > 0 ? static_cast<double>(kept_) / static_cast<double>(moved) : 0, search.error_of_fewer()};
+  const auto needed = [](size_t kept, size_t of) {
+    return of > 0 ? static_cast<double>(kept) / static_cast<double>(of) : 0;
+  };
+  const Choice free{needed(kept_, moved), search.error_of_fewer()},
+      whole{needed(kept_of_whole_, most), of_whole.error_of_fewer()};
+  return whole.needed > free.needed ? whole : free;
 }
 
 std::string Planner::words_of_choice(const std::string& body, const std::vector<Candidate>& list, size_t moved,
@@ -370,7 +413,7 @@ bool Planner::choose_from_more(Scene& scene, const OutputErrors& worst, const Ru
   }
   candidates_ = std::min(candidates_ + candidates_ / 2, most_candidates);
   note_shown(scene, hooks);
-  too_few_ = kept_ + 1;
+  too_few_ = kept_ + 1, too_few_of_whole_ = kept_of_whole_ + 1;
   plan.push_back(fmt::format("truncation: {:.1e} in {}; modes are chosen again, from {} of each body", worst.truncation,
                              worst.name, candidates_));
   const Scene fewer = scene;

@@ -45,6 +45,7 @@ class Planner {
     double error_of_fewer = 0;  // of the most that are not enough
   };
   bool choose_as_flown(Scene&, const RunHooks&, std::vector<std::string>& plan);
+  void choose_bases(Scene&, const RunHooks&, std::vector<std::string>& plan) const;
   std::optional<Choice> choose_among_candidates(Scene&, const RunHooks&, std::vector<std::string>& plan);
   /// Clamped bodies take theirs from so many that are `made`, and some for the budget: once for all runs.
   Scene with_candidates(const Scene&, int candidates, int made, const RunHooks&) const;
@@ -56,6 +57,9 @@ class Planner {
   /// choice are bearable.
   std::optional<Run> with_all(Scene&, const RunHooks&, Scene& open, Scene& all, std::vector<std::string>& plan);
   bool has_choice(const Scene&, const std::string& body) const;
+  /// Bodies of bases without a choice have their first `modes` at most.
+  Scene with_first_of_whole(Scene, size_t modes) const;
+  size_t most_of_whole(const Scene&) const;
   std::vector<Candidate> ranked(const Scene&, const Run&) const;
   void note_still(const std::vector<Candidate>&);
   /// What is taken of a body and what is left out, of a list of which the first `moved` move.
@@ -80,6 +84,8 @@ class Planner {
   int steps_ = 0;                           // improvements so far
   size_t kept_ = 0;                         // modes of all bodies, of the last choice
   size_t too_few_ = 0;                      // at least so many are needed, as a budget has shown
+  size_t kept_of_whole_ = 0;                // modes of each body whose basis has no choice, of the last choice
+  size_t too_few_of_whole_ = 0;             // as too_few_
   StillKinds still_;
   bool is_timed_ = false;        // the scene has the tolerance that its integrator needs
   bool costly_ = false;          // more candidates are not bearable

@@ -3,7 +3,11 @@
 #include "apps/model/prepared_body.hpp"
 #include "apps/simulate/tree_flight.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
+#include <string>
 #include <vector>
 
 namespace flexboom {
@@ -57,6 +61,15 @@ std::vector<Vector3d> free_turns(const Scene& scene, const std::string& body) {
   return turns;
 }
 
+/// Without round-off: bodies that move alike have the same modes.
+Vector3d rounded(const Vector3d& v) {
+  constexpr double digits = 1e-12;
+  const auto of = [size = v.norm()](double x) {
+    return std::abs(x) <= digits * size ? 0 : std::stod(fmt::format("{:.12g}", x));
+  };
+  return {of(v.x()), of(v.y()), of(v.z())};
+}
+
 }  // namespace
 
 Scene with_steady_motions(Scene scene) {
@@ -72,7 +85,8 @@ Scene with_steady_motions(Scene scene) {
     const auto index = std::ranges::find(joined.bodies, b.name, &BodyScene::name) - joined.bodies.begin();
     const PlaceMotionInSpace m = tree.motion(0, state, Place{.body = static_cast<int>(index), .marker = {}});
     const Vector3d acceleration = m.omega.cross(m.velocity - v) - joined.gravity;
-    b.basis.motion = {m.axes.transpose() * m.omega, m.axes.transpose() * acceleration, free_turns(joined, b.name)};
+    b.basis.motion = {rounded(m.axes.transpose() * m.omega), rounded(m.axes.transpose() * acceleration),
+                      free_turns(joined, b.name)};
   }
   return scene;
 }

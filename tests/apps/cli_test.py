@@ -1200,6 +1200,25 @@ class Plan(Case):
                           "--plan", self.folder / "whole", "--continue", out, "--no-budget")
         self.assert_exit(OK, result)
 
+    @long_case
+    def test_a_basis_of_the_plan_is_kept_with_it(self):
+        scene = self.folder / "wires.toml"
+        scene.write_text((MESHES / "wire-spinner.toml").read_text().replace("modes = 8", 'modes = "auto"'))
+        arguments = ("--duration", "2", "--tolerance", "1e-2", "--no-budget")
+        self.assert_exit(OK, flexboom("run", scene, *arguments, "--out", self.folder / "first"))
+        self.assertIn('basis = "prestressed"', (self.folder / "first" / "scene.toml").read_text())
+        self.assert_exit(OK, flexboom("run", scene, *arguments, "--out", self.folder / "again",
+                                      "--plan", self.folder / "first"))
+        first, again = ((self.folder / name / "trajectory.csv").read_text() for name in ("first", "again"))
+        self.assertEqual(first, again)
+        result = flexboom("run", scene, "--duration", "3", "--tolerance", "1e-2", "--no-budget", "--out",
+                          self.folder / "rest", "--plan", self.folder / "first", "--continue", self.folder / "first")
+        self.assert_exit(OK, result)
+        scene.write_text(scene.read_text().replace("modes =", 'basis = "clamped"\nmodes ='))
+        result = flexboom("run", scene, *arguments, "--out", self.folder / "other", "--plan", self.folder / "first")
+        self.assert_exit(INPUT, result)
+        self.assertIn('has the basis "clamped" here and "prestressed"', result.stderr)
+
     def test_a_plan_of_other_bodies_is_refused(self):
         self.run_of("sport", "--no-budget")
         result = flexboom("run", "panel-slew", "--plan", self.folder / "sport", "--out", self.folder / "other")
