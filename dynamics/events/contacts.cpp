@@ -10,7 +10,6 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double on_stop = 4e-16;   // as near as a place is known [rad] or [m]
 constexpr double one_time = 1e-12;  // relative: times this close are one
 constexpr double slow = 1e-6;       // ways within a period on the stop that may be round-off [rad] or [m]
 
@@ -39,6 +38,7 @@ Stop stop_of(const Joint& joint, std::size_t index, const ReducedBody& beyond) {
 Contacts::Contacts(std::vector<Stop> stops, const FlightOptions& options, std::size_t joints)
     : stops_(std::move(stops)),
       settle_(options.settle_at()),
+      tolerance_(options.tolerance),
       history_(stops_at_start(options, joints)),
       closed_(stops_.size(), 0),
       armed_(stops_.size(), 0),
@@ -60,9 +60,12 @@ void Contacts::begin(StopMotion& motion) {
     const Gap gap = motion.gap(i);
     approach_[i].observe(gap.value, gap.rate, stops_[i].spring_rate);
     if (!armed_[i]) continue;
-    const bool on = std::abs(gap.value) < on_stop;
+    const double place = motion.place();
+    const bool on = std::abs(gap.value) < place;
+    held_[i] = on && place > place_of_one_number && std::abs(gap.rate) * stops_[i].period < place;
     const bool goes = gap.rate > 0 || (gap.rate == 0 && on && motion.push(i, open).acceleration > 0);
-    closed_[i] = history_[stops_[i].joint].closed.value_or(on ? goes : gap.value > 0);
+    closed_[i] = history_[stops_[i].joint].closed.value_or(on ? goes && held_[i] == 0 : gap.value > 0);
+    if (held_[i] != 0) follows_the_push(i, motion);
   }
 }
 
@@ -74,9 +77,13 @@ bool Contacts::update(StopMotion& motion, double t, std::vector<StopEvent>& even
     history.largest_rate = std::max(history.largest_rate, std::abs(gap.rate));
     history.largest_gap = std::max(history.largest_gap, std::abs(gap.value));
     if (!stops_[i].is_there) continue;
-    const bool slipped = slipped_through(i, gap, held_[i] != 0 ? std::max(motion.noise(i), on_stop) : motion.noise(i));
-    if (held_[i] != 0 && std::abs(gap.value) > on_stop) {
+    const double noise = held_[i] != 0 ? std::max(motion.noise(i), still(motion)) : motion.noise(i);
+    const bool slipped = slipped_through(i, gap, noise);
+    if (held_[i] != 0 && std::abs(gap.value) > still(motion)) {
       held_[i] = 0;
+      changed = true;
+    } else if (held_[i] != 0 && follows_the_push(i, motion)) {
+      events.push_back({t, static_cast<int>(stops_[i].joint), closed_[i] != 0, gap.rate});
       changed = true;
     }
     if (!armed_[i]) {
@@ -140,6 +147,12 @@ double Contacts::small(std::size_t i, const StopMotion& motion) const {
   return std::max(settle_ * history_[stops_[i].joint].largest_rate * stops_[i].period, motion.noise(i));
 }
 
+/// Gap within which a joint that is held is on its stop. A gap that is made of several numbers has their errors, too.
+double Contacts::still(const StopMotion& motion) const {
+  const bool is_rough = motion.place() > place_of_one_number;
+  return is_rough ? std::max(motion.place(), 1e-3 * tolerance_) : motion.place();
+}
+
 /// Is a crossing at this rate but the end of a motion that has died out on its way to the stop?
 bool Contacts::has_decayed(std::size_t i, Gap gap, StopMotion& motion) {
   if (!approach_[i].has_decayed(gap.rate)) return false;
@@ -153,7 +166,7 @@ bool Contacts::has_decayed(std::size_t i, Gap gap, StopMotion& motion) {
 /// Is the wrong side but noise of a joint that rests on its stop? What pushes it turns it back then, before it is
 /// farther away than its place is known. Only where no crossing was found: a search would go on finding it.
 bool Contacts::comes_back(std::size_t i, Gap gap, double t, StopMotion& motion) {
-  const double known = std::min(100 * motion.noise(i), on_stop);
+  const double known = std::min(100 * motion.noise(i), motion.place());
   const bool is_small = std::abs(gap.rate) * stops_[i].period < slow && std::abs(gap.value) < known;
   if (crossed_[i] != 0 || !is_small || t == came_back_[i]) return false;
   const double back = (gap.value < 0 ? 1 : -1) * motion.push(i, closed_).acceleration;
@@ -168,15 +181,24 @@ bool Contacts::trembles(std::size_t i, Gap gap, double t) const {
 }
 
 /// A joint that is pushed off its stop, or into it, from rest is within round-off of it for a while. Where it goes is
-/// decided by the push, and there it is looked at again. The event before was round-off, as this one is.
+/// decided by the push, and there it is looked at again. The event before stays where it says the same.
 void Contacts::hold(std::size_t i, std::vector<StopEvent>& events, StopMotion& motion) {
   const auto joint = static_cast<int>(stops_[i].joint);
-  const auto before = std::find_if(events.rbegin(), events.rend(),
-                                   [&](const StopEvent& e) { return e.joint == joint && e.kind == EventKind::stop; });
-  if (before != events.rend() && before->time == met_[i]) events.erase(std::next(before).base());
   motion.put_on_stop(i);
   closed_[i] = motion.push(i, closed_).acceleration > 0;
+  const auto before = std::find_if(events.rbegin(), events.rend(),
+                                   [&](const StopEvent& e) { return e.joint == joint && e.kind == EventKind::stop; });
+  if (before != events.rend() && before->time == met_[i] && before->contact != (closed_[i] != 0))
+    events.erase(std::next(before).base());
   held_[i] = 1;
+}
+
+/// Does a joint that is on its stop but for round-off begin to be pressed onto it, or off it?
+bool Contacts::follows_the_push(std::size_t i, StopMotion& motion) {
+  const double way = motion.push(i, closed_).acceleration * stops_[i].period * stops_[i].period;
+  if (std::abs(way) < 2 * still(motion) || (way > 0) == (closed_[i] != 0)) return false;
+  closed_[i] = way > 0;
+  return true;
 }
 
 /// Does something push a joint that is on its stop, so that it will not stay there? One that is pressed against its

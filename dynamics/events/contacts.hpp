@@ -29,6 +29,9 @@ struct StopEvent {
 /// "contact", "release" or the name of the kind.
 std::string_view event_name(const StopEvent&);
 
+/// Round-off of a gap that is one number of the state [rad] or [m].
+inline constexpr double place_of_one_number = 4e-16;
+
 /// How far beyond its stop a joint is, and how fast it goes there.
 struct Gap {
   double value = 0;  // [rad] or [m]
@@ -50,6 +53,8 @@ class StopMotion {
   virtual Push push(std::size_t stop, std::span<const char> closed) = 0;
   /// What the error of the method leaves open of a gap.
   virtual double noise(std::size_t stop) const = 0;
+  /// How near a gap is known where it is one number of the state, or is made of several [rad] or [m].
+  virtual double place() const { return place_of_one_number; }
   /// Makes the gap zero, where it is one number of the state.
   virtual void put_on_stop(std::size_t) {}
 };
@@ -74,7 +79,8 @@ class Contacts {
 
   /// A stop is closed as a flight that this one goes on left it. Without such a flight, it is closed where the joint is
   /// beyond the stop. Exactly on the stop, it is decided by where the joint goes. At rest there, it is decided by where
-  /// the joint is pushed. Stops that had settled are as good as open.
+  /// the joint is pushed. Stops that had settled are as good as open. A joint at rest whose gap is made of several
+  /// numbers is looked at again when it has moved by more than their round-off.
   void begin(StopMotion&);
 
   /// Applies the crossings that a step ended at, and what settles or wakes.
@@ -103,14 +109,16 @@ class Contacts {
   bool has_decayed(std::size_t i, Gap, StopMotion&);
   bool comes_back(std::size_t i, Gap, double t, StopMotion&);
   bool trembles(std::size_t i, Gap, double t) const;
+  bool follows_the_push(std::size_t i, StopMotion&);
   void hold(std::size_t i, std::vector<StopEvent>&, StopMotion&);
   bool is_pushed(std::size_t i, StopMotion&) const;
   double small(std::size_t i, const StopMotion&) const;
+  double still(const StopMotion&) const;
   void settle(std::size_t i, double t);
   void wake(std::size_t i, Gap);
 
   std::vector<Stop> stops_;
-  double settle_;
+  double settle_, tolerance_;
   std::vector<StopHistory> history_;  // per joint
   std::vector<char> closed_, armed_;
   std::vector<int> crossed_;

@@ -25,6 +25,14 @@ namespace {
 
 /// Part of the tolerance wanted over a run that each step is asked for.
 constexpr double local_share = 0.015, local_share_of_loads = 0.0015;
+/// Below that, round-off of absolute coordinates takes more steps than the digits of loads are worth.
+constexpr double least_of_loads = 1.5e-13;
+
+double local_tolerance(const FlightOptions& o) {
+  const double usual = local_share * o.tolerance;
+  return o.loads ? std::max(local_share_of_loads * o.tolerance, std::min(usual, least_of_loads)) : usual;
+}
+
 /// A violation of a joint at the start beyond this [m, rad, their rates] is the caller's mistake.
 constexpr double open_joint = 1e-8;
 
@@ -58,9 +66,8 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     const double soon = t_ + 1e-14 * options.duration;  // what jumps at the start has jumped
     equations_.make_consistent(soon, y_, y_dot_, memory_);
     const double shaking = std::max(balance_of(equations_, y_, memory_).shaking(), options_.largest.shaking);
-    scales_ = std::make_unique<StateScales>(equations_, y_, y_dot_, shaking,
-                                            (options.loads ? local_share_of_loads : local_share) * options.tolerance,
-                                            options.duration);
+    scales_ =
+        std::make_unique<StateScales>(equations_, y_, y_dot_, shaking, local_tolerance(options), options.duration);
     make_method();
   }
 
@@ -227,9 +234,10 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
   }
   void strike(double impulse) override { y_ += impulse * blow_; }
 
+  double place() const override { return 1e-14; }  // attitudes of two bodies make an angle
   double noise(size_t stop) const override {
-    constexpr double of_steps = 0.3, round_off = 1e-14;
-    return std::max(round_off, of_steps * local_share * options_.tolerance * contacts_.largest_gap(stop));
+    constexpr double of_steps = 0.3;
+    return std::max(place(), of_steps * local_share * options_.tolerance * contacts_.largest_gap(stop));
   }
 
   void start_on_constraints(const std::vector<BodyState>& start) {
