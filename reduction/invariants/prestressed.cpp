@@ -133,8 +133,8 @@ PrestressedBasis prestressed_modes(const Mesh& mesh, const Assembly& assembly, c
                                    const SteadyMotion& motion,
                                    const std::function<ModalBasis(int count)>& clamped_modes, int most, int modes,
                                    int threads) {
-  const bool large = most > 2000;  // where higher modes of one kind take long to find among all
-  const int first = large ? modes + 6 : 2 * modes + 8, bearable = large ? first : 400;
+  constexpr int work = 4'000'000;  // modes times unknowns: more of them take long to find
+  const int first = 2 * modes + 8, bearable = std::max(first, std::min(400, work / most));
   constexpr double converged = 1e-6;
   require(modes >= 1 && modes <= most,
           fmt::format("prestressed: {} modes asked of a body with {} unknowns", modes, most));
@@ -142,7 +142,7 @@ PrestressedBasis prestressed_modes(const Mesh& mesh, const Assembly& assembly, c
   ModalBasis clamped;
   PrestressedShapes shapes;
   double change = 1;  // of squared frequencies
-  int last = 0;
+  int last = 0, before_last = 0;
   GeometricOptions options;
   options.threads = threads;
   for (int count = std::min(first, most); change > converged && last < most && count <= bearable;
@@ -153,7 +153,7 @@ PrestressedBasis prestressed_modes(const Mesh& mesh, const Assembly& assembly, c
       if (last == 0) throw;
       break;  // there are no more, or they cannot be verified so far beyond the lowest
     }
-    last = count;
+    before_last = std::exchange(last, count);
     result.clamped = reduce(mesh, assembly, clamped, "clamped", threads);
     result.clamped.Kg = geometric_stiffness(mesh, assembly, clamp, clamped.Phi, options);
     const VectorXd before = std::exchange(shapes, prestressed_shapes(result.clamped, motion, modes)).lambda;
@@ -163,9 +163,10 @@ PrestressedBasis prestressed_modes(const Mesh& mesh, const Assembly& assembly, c
   result.basis.unknowns = clamped.unknowns;
   if (change > converged && last < most)
     result.basis.summary.note =
-        large ? fmt::format("prestressed: combined of {} clamped modes; what more would change was not measured", last)
-              : fmt::format("prestressed: twice as many clamped modes change its frequencies by {:.0e}",
-                            std::sqrt(change));
+        before_last == 0
+            ? fmt::format("prestressed: combined of {} clamped modes; what more would change was not measured", last)
+            : fmt::format("prestressed: {} clamped modes instead of {} change its frequencies by {:.0e}", last,
+                          before_last, std::sqrt(change));
   result.clamped_Phi = std::move(clamped.Phi);
   return result;
 }

@@ -38,8 +38,8 @@ struct PrestressedBasis {
 
 /// `clamped_modes(count)` gives the first modes of the held body, of the directions wanted; `most` of them there are.
 /// Twice as many are taken until they change the squared frequencies of prestressed_shapes by less than 1e-6; where
-/// that takes more than 400, `basis.summary.note` has the change. Of more than 2000 unknowns six more than `modes` are
-/// taken, and the note says that nothing was measured. Me and Ke of the basis are diagonal, as by ritz_modes.
+/// that takes more than 400, or more than 4e6 by the number of unknowns, `basis.summary.note` has the change. Me and Ke
+/// of the basis are diagonal, as by ritz_modes.
 /// @throws InputError, NumericalError as prestressed_shapes, geometric_stiffness and ritz_modes.
 PrestressedBasis prestressed_modes(const Mesh&, const Assembly&, const Clamp&, const SteadyMotion&,
                                    const std::function<ModalBasis(int count)>& clamped_modes, int most, int modes,

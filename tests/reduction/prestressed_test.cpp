@@ -109,6 +109,21 @@ TEST(Prestressed, ShapesAndRotationsHoldTheModes) {
   }
 }
 
+/// Many elements have the modes of few: as many clamped modes are combined as that takes.
+TEST(Prestressed, OfManyUnknownsAreThoseOfFew) {
+  const SteadyMotion motion{{0, 0, 0.5}, Vector3d::Zero(), {Vector3d::UnitY(), Vector3d::UnitZ()}};
+  const auto lambda = [&](int elements) {
+    BeamGeometry wire = uniform_boom(RoundBar{1e-3}, 20, BeamTheory::euler_bernoulli, elements, 4);
+    const Model model = clamped(make_mesh(wire));
+    const int most = unknowns(model.mesh, model.assembly.dofs, model.clamp).count;
+    const PrestressedBasis made = prestressed_modes(
+        model.mesh, model.assembly, model.clamp, motion, [&](int count) { return held(model, count); }, most, 3);
+    return VectorXd(prestressed_shapes(stiffened(model, made.basis), motion, 3).lambda);
+  };
+  const VectorXd few = lambda(12), many = lambda(70);
+  EXPECT_LT((many.array() / few.array() - 1).abs().maxCoeff(), 1e-4) << few.transpose() << "\n" << many.transpose();
+}
+
 TEST(Prestressed, WithoutMotionAreTheModesOfTheBodyAtRest) {
   const Model model = beam(strip, 1.5, BeamTheory::timoshenko, 4, 6);
   const PrestressedBasis made = prestressed(model, {}, 5);
