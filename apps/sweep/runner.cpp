@@ -1,5 +1,6 @@
 #include "apps/sweep/runner.hpp"
 
+#include "apps/model/static_shapes.hpp"
 #include "apps/simulate/planner.hpp"
 #include "apps/simulate/steady_motion.hpp"
 #include "apps/simulate/time_error.hpp"
@@ -24,7 +25,11 @@ SweepRunner::SweepRunner(SceneSource source, SweepValues values, bool loads, boo
   std::vector<std::string> plan;
   const double given = scene_.integrator_tolerance;
   scene_.bodies_kept_in = source_.bodies_kept_in();
-  Planner(scene_).choose(scene_, hooks(), plan);
+  Scene planned = with_steady_motions(scene_);
+  Planner(planned).choose(planned, hooks(), plan);
+  for (size_t i = 0; i < scene_.bodies.size(); ++i)  // each run has its own steady motion
+    if (scene_.bodies[i].modes_auto) planned.bodies[i].basis.motion = scene_.bodies[i].basis.motion;
+  scene_ = std::move(planned);
   set_options(scene_);
   validate(scene_);
   for (const BodyScene& b : with_joints(with_steady_motions(scene_)).bodies)
@@ -67,13 +72,23 @@ void SweepRunner::note_columns(Scene scene) {
     if (std::find(columns_.begin(), columns_.end(), name) == columns_.end()) columns_.push_back(name);
 }
 
+namespace {
+
+/// Those that were chosen for the scene as it stands. Modes of a steady motion are those of the motion of the run.
+void take_modes(BodyScene& b, const BodyScene& planned) {
+  b.modes = planned.modes;
+  b.open_directions();
+  if (!b.basis_given && b.basis.name != planned.basis.name) b.basis.name = planned.basis.name;
+  if (b.basis.name == "clamped") b.shapes = planned.shapes;
+  add_static_shapes(b.basis.corrections, planned.basis.corrections);
+}
+
+}  // namespace
+
 /// What the command line asks of every run, and what was chosen once for all of them.
 void SweepRunner::set_options(Scene& scene) const {
   for (size_t i = 0; i < scene.bodies.size(); ++i)
-    if (BodyScene& b = scene.bodies[i]; std::exchange(b.modes_auto, false)) {
-      b.modes = scene_.bodies[i].modes, b.shapes = scene_.bodies[i].shapes;
-      b.open_directions();
-    }
+    if (BodyScene& b = scene.bodies[i]; std::exchange(b.modes_auto, false)) take_modes(b, scene_.bodies[i]);
   if (digits_share_) scene.limit_digits_share(*digits_share_);
   if (loads_) ask_for_loads(scene);
 }

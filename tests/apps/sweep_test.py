@@ -166,6 +166,21 @@ class Values(Case):
         self.assert_exit(OK, result)
         self.assertEqual(self.table(self.folder / "wires")["status"], ["ok", "ok"])
 
+    def test_a_plan_of_the_scene_is_that_of_its_runs(self):
+        text = (cli.MESHES / "wire-spinner.toml").read_text().replace("duration = 60.0", "duration = 2.0")
+        keys = {"east": "", "north": 'basis = "mean-axis"', "west": 'basis = "prestressed"', "south": 'basis = "clamped"'}
+        for name, basis in keys.items():
+            text = text.replace(f'name = "{name}"\nmodes = 8', f'name = "{name}"\nmodes = "auto"\n{basis}')
+        scene = self.folder / "planned.toml"
+        scene.write_text(text.replace("tolerance = 1e-6", "tolerance = 1e-2"))
+        result = flexboom("sweep", scene, "--vary", "bodies.hub.mass=250,251",
+                          "--quantity", "east.tip.y:final", "--quantity", "north.angle1:final", "--out", self.folder / "planned")
+        self.assert_exit(OK, result)
+        self.assert_exit(OK, flexboom("run", scene, "--out", self.folder / "run"))
+        columns = cli.columns(self.folder / "run" / "trajectory.csv")
+        for name in ("east.tip.y", "north.angle1"):
+            self.assertEqual(self.numbers(self.folder / "planned", name + ":final")[0], columns[name][-1])
+
 
 class Journal(Case):
     DRAW = ("--vary", "hub.mass=normal:9:0.5", "--vary", "hinges.sip.P2=uniform:0.01:0.03", "-n", "400", *POINTING)
