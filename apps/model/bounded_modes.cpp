@@ -56,6 +56,13 @@ double slowest_fall(const SectionShape& section, bool own) {
   return own && is_compact ? rectangle : usual_fall;
 }
 
+/// Where the material changes, the rim of the surface between the two is singular.
+bool changes_material(const BeamGeometry& g) {
+  return std::ranges::adjacent_find(g.segments, [](const BeamSegment& a, const BeamSegment& b) {
+           return a.material.E != b.material.E || a.material.nu != b.material.nu;
+         }) != g.segments.end();
+}
+
 /// Is an element of beams much stiffer at one end? Errors gather at the thin end, and fall slowly until elements are
 /// short beside the distance to where there would be nothing left.
 bool is_steep(const BeamProperty& p) {
@@ -167,6 +174,7 @@ double slowest_fall(const BodyScene& body) {
   double slowest = 0;
   for (const BeamSegment& s : body.geometry.segments)
     slowest = std::max({slowest, slowest_fall(s.start, own), slowest_fall(s.end, own)});
+  if (changes_material(body.geometry)) slowest = std::max(slowest, usual_fall);
   return has_given_sizes(body.solid.grading) ? std::max(slowest, coarse_fall) : slowest;
 }
 

@@ -1,6 +1,11 @@
 #include "apps/model/static_shapes.hpp"
 
+#include "apps/base/deflection.hpp"
+#include "apps/scene/wanted_accuracy.hpp"
 #include "fem/base/text_reader.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -90,6 +95,26 @@ std::vector<std::string> loads_without_shapes(const Scene& scene, const BodyScen
     });
   });
   return markers;
+}
+
+std::string loads_without_stiffness(const Scene& scene, const ReducedBody& body) {
+  if (body.n() == 0 || body.Kg.spin.empty()) return {};
+  std::vector<std::string> markers = loaded_markers(scene, body.name);
+  const bool has_tip = scene.outputs.empty() || std::ranges::any_of(scene.outputs, [&](const std::string& text) {
+                         return wanted_output(text).name == body.name + ".tip";
+                       });
+  if (const Marker* tip = tip_of(body); has_tip && tip != nullptr) markers.push_back(tip->name);
+  std::ranges::sort(markers);
+  markers.erase(std::unique(markers.begin(), markers.end()), markers.end());
+  std::erase_if(markers, [&](const std::string& loaded) {
+    const Marker& place = marker(body, loaded);
+    return place.S.norm() + place.S_theta.norm() == 0 ||
+           std::ranges::any_of(body.Kg.markers,
+                               [&](const MarkerStiffness& k) { return is_same_node(body, loaded, k.marker); });
+  });
+  if (markers.empty()) return "";
+  return fmt::format("body {} has no geometric stiffness of loads at {} (reduce --loads-at names its markers)",
+                     body.name, fmt::join(markers, ", "));
 }
 
 void add_static_shapes(std::vector<std::string>& corrections, const std::vector<std::string>& shapes) {

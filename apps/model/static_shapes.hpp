@@ -28,6 +28,11 @@ bool can_load(const ReducedBody&, const std::string& marker);
 /// Markers of a body from a file where loads of the scene act and its body with more modes has no static shapes.
 std::vector<std::string> loads_without_shapes(const Scene&, const BodyScene&);
 
+/// Names the markers of a body where loads of the scene act, or whose displacement is an output, and for which the body
+/// has no geometric stiffness: a load there does not stiffen it, and the marker comes no nearer where the body bends.
+/// Empty where there is none, and of a body without any geometric stiffness.
+std::string loads_without_stiffness(const Scene&, const ReducedBody&);
+
 /// Adds those that are not there; names of node sets compare without case.
 void add_static_shapes(std::vector<std::string>& corrections, const std::vector<std::string>& shapes);
 

@@ -319,6 +319,11 @@ double linearisation_error(Scene& scene, Scene& flown, Run& run, Measuring& m) {
     m.missing("linearisation", fmt::format("body {} has no geometric stiffness", body->name));
     return unknown;
   }
+  for (const PreparedBody& p : run.bodies)
+    if (const std::string lack = loads_without_stiffness(scene, p.body); !lack.empty()) {
+      m.missing("linearisation", lack);
+      return unknown;
+    }
   std::vector<OutputDifference> differences;
   Run stiffened;
   if (leaves_stiffening_out(run)) {

@@ -229,6 +229,9 @@ void add_warnings(const Run& run, RunResult& r) {
                       "of small deflections no longer holds",
                       run.bodies[i].body.name, b.size, b.time, 100 * b.of_length));
   r.warnings.insert(r.warnings.end(), run.motion.warnings.begin(), run.motion.warnings.end());
+  for (const PreparedBody& p : run.bodies)  // which the budget says, where it is measured
+    if (std::string lack = loads_without_stiffness(r.scene, p.body); !lack.empty() && !r.budget.measured)
+      r.warnings.push_back(std::move(lack));
   constexpr Eigen::Index few = 5;
   if (const Eigen::Index rows = run.outputs.values.rows(); r.budget.measured && rows < few)
     r.warnings.push_back(

@@ -19,7 +19,7 @@ Scene with_a_digit_more(Scene scene) {
 Scene as_flown(Scene scene, const Run& run) {
   for (BodyScene& b : scene.bodies) {
     const auto body = std::ranges::find(run.bodies, b.name, [](const PreparedBody& p) { return p.body.name; });
-    if (b.stiffening != "auto" || body == run.bodies.end()) continue;
+    if (b.stiffening != "auto" || body == run.bodies.end() || body->body.n() == 0) continue;  // that shows nothing
     const auto index = static_cast<int>(body - run.bodies.begin());
     b.stiffening = run.tree->stiffening(index) == Stiffening::off ? "off" : "on";
   }

@@ -488,6 +488,7 @@ class RunFiles(Case):
         folder = self.run_sport("--duration", "0.2", "--report", "--vtu-step", "0.1", out="more")
         self.assertLess({"report.html", "motion.pvd", "motion_00000.vtu", "motion_00002.vtu"}, set(os.listdir(folder)))
 
+    @long_case
     def test_run_goes_on_with_the_digits_of_the_other(self):
         def run(duration, out, *options):
             self.assert_exit(OK, flexboom("run", "sport-calibration", "--no-budget", "--tolerance", "1e-3", "--duration",
@@ -1020,6 +1021,7 @@ material = { E = 70e9, nu = 0.3, rho = 2700 }
             bounds = self.assert_bounds_hold(document, exact)
             self.assertLess(bounds, 3 * abs(np.array(document["frequencies_hz"]) / exact - 1).max())
 
+    @long_case
     def test_bounds_of_few_solid_elements_hold(self):
         # The program's mesh for 1e-4: good to 2e-5 by its own bounds.
         exact = np.array([45.7533895, 68.5226352, 285.254706, 424.513373, 792.281229])
@@ -1076,6 +1078,7 @@ material = { E = 70e9, nu = 0.3, rho = 2700 }
         self.assertIsNone(document["accuracy_met"])
         self.assertIn("a mesh file has no finer mesh", document["error_bounds_found"])
 
+    @long_case
     def test_a_mesh_file_does_not_say_what_is_held(self):
         deck = self.folder / "boom.inp"
         result = flexboom("mesh", BOOM4, "-o", deck, "--structure", "solid", "--element", "hex20")
@@ -1095,6 +1098,7 @@ material = { E = 70e9, nu = 0.3, rho = 2700 }
             self.assertIn("would be overwritten", result.stderr)
         self.modes(mesh, "--clamp", "root")
 
+    @long_case
     def test_an_attachment_sits_at_a_step_of_a_solid(self):
         body = self.folder / "step.toml"
         material = "material = { E = 70e9, nu = 0.3, rho = 2700 }"
@@ -1180,6 +1184,7 @@ class Plan(Case):
         self.assert_exit(OK, result)
         return json.loads((out / "summary.json").read_text()), (out / "trajectory.csv").read_text(), result.stdout
 
+    @long_case
     def test_a_plan_is_printed_kept_and_taken_again(self):
         planned, rows, printed = self.run_of("first", "--modes", "auto")
         self.assertTrue(planned["accuracy_met"])
@@ -1225,6 +1230,7 @@ class Plan(Case):
         self.assert_exit(INPUT, result)
         self.assertIn('has no boom "panel"', result.stderr)
 
+    @long_case
     def test_what_a_scene_says_itself_stays_or_is_told(self):
         planned = self.folder / "planned"
         self.run_of("planned", "--modes", "auto", "--no-budget")
@@ -1263,6 +1269,7 @@ class Plan(Case):
 
 
 class Bench(Case):
+    @long_case
     def test_transient_of_a_scene(self):
         scene = self.folder / "short.toml"
         scene.write_text((MESHES / "sport.toml").read_text().replace("duration = 10.0", "duration = 0.2"))
@@ -1454,6 +1461,7 @@ class Reduce(Case):
         self.assertGreater(error(without), 1e-2)  # one mode per plane leaves 3 %
         self.assertLess(error(exact), 1e-8)
 
+    @long_case
     def test_hinge_basis(self):
         """Shapes that turn the root for each stiffness, and beside them what the body's directions ask for."""
         plane = self.folder / "plane.toml"
@@ -1479,6 +1487,7 @@ class Reduce(Case):
             self.assertEqual(set(kinds) - {"interface"}, {"bending_y"}, basis)
             self.assertEqual(kinds.count("interface"), 2 if basis == interfaces else 0)
 
+    @long_case
     def test_names_of_node_sets_compare_without_case(self):
         """Decks write them in capitals."""
         for arguments in (("--loads-at", "tip"), ("--attach", "tip.Fy"), ("--select", "output:tip.uy,0.9"),
@@ -1594,6 +1603,7 @@ start_angle = 1.0
         self.assertIsNotNone(of_file["truncation"])
         self.assertIsNone(of_file["discretisation"])
 
+    @long_case
     def test_the_file_tells_the_errors_of_loads_anywhere(self):
         """As those of the same body in the scene: a hinge at a place between root and tip."""
         rod = BOOM4.read_text() + "[[attachments]]\nname = \"mid\"\nposition = 0.2\nmass = 0.01\n"
@@ -1666,6 +1676,7 @@ class Compare(Case):
         self.assertLess(orders[-1]["subspace"], 1e-9)
         self.assertEqual(len(document["bodies"][0]["modes"]), 10)
 
+    @long_case
     def test_more_modes_than_low_orders_have(self):
         for count, first in (16, 1), (17, 2), (30, 3):
             result = flexboom("compare", BOOM4, "--json", "--count", str(count), "--tolerance", "1")

@@ -16,7 +16,7 @@ constexpr const char* start = R"toml(format = "flexboom-scene-1"
 name = "bases"
 duration = 0.2
 output_step = 0.01
-accuracy = { tolerance = 1e-9, budget = false }
+accuracy = { tolerance = 1e-7, budget = false }
 )toml";
 
 // Its stiffening, which a hub does not have, is left out everywhere.
