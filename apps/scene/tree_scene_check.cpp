@@ -391,10 +391,10 @@ class TreeCheck {
     const std::string& body = scene_.turns.front().body;
     if (!body_named("turns[0].body", body)) return;
     std::vector<Eigen::Vector3d> axes;
-    bool rest = true;
+    std::vector<std::string> moving;
     for (const WheelScene& w : scene_.wheels) {
       if (w.body == body && !w.torque.given()) axes.push_back(w.axis);
-      rest = rest && w.spin == 0;
+      if (w.spin != 0) moving.push_back(fmt::format("wheel \"{}\"", w.name));
     }
     if (axes.size() != 3 || std::abs(axes[0].cross(axes[1]).dot(axes[2])) < 0.1)
       faults_.add("turns[0].body", fmt::format("{} has {} wheels without a torque of their own; three are needed, with "
@@ -403,8 +403,9 @@ class TreeCheck {
     bool free = false;
     for (const JointScene& j : scene_.joints) {
       free = free || (j.kind == JointKind::free && j.a.body.empty() && j.b.body == body);
-      rest = rest && j.start_omega.isZero(0) && j.start_velocity.isZero(0) &&
-             std::ranges::all_of(j.start_rate, [](double v) { return v == 0; });
+      if (!j.start_omega.isZero(0) || !j.start_velocity.isZero(0) ||
+          std::ranges::any_of(j.start_rate, [](double v) { return v != 0; }))
+        moving.push_back(fmt::format("joint \"{}\"", j.name));
     }
     if (!free)
       faults_.add("turns[0].body",
@@ -412,7 +413,10 @@ class TreeCheck {
                               toml_reader::in_quotes(body)));
     if (std::ranges::any_of(scene_.joints, [](const JointScene& j) { return j.closes_loop; }))
       faults_.add("turns", "need a tree: with closed loops give the wheels their torques");
-    if (!rest) faults_.add("turns", "start from rest: joints and wheels must have no rates at t = 0");
+    if (!moving.empty())
+      faults_.add("turns",
+                  fmt::format("start from rest, but {} moves at t = 0: let it start without a rate, or drop the turns",
+                              fmt::join(moving, ", ")));
   }
 
   /// Each body hangs on one joint, and following them leads to the inertial frame.

@@ -215,7 +215,7 @@ TEST(TreeScene, TurnsAreReadCheckedAndWrittenBack) {
       {"pause = 10.0", "paus = 10.0", "turns[0].paus: unknown key; did you mean \"pause\"?"},
       {"kind = \"free\"", "kind = \"spherical\"", "turns[0].body: \"sport\" can not turn"},
       {"inertia = 2e-5", "inertia = 2e-5\ntorque = 0", "has 2 wheels without a torque of their own"},
-      {"inertia = 2e-5", "inertia = 2e-5\nspin = 1", "turns: start from rest"},
+      {"inertia = 2e-5", "inertia = 2e-5\nspin = 1", "turns: start from rest, but wheel \""},
       {"[[turns]]\nbody = \"sport\"", "[[turns]]\nbody = \"sprt\"", "turns[0].body: is \"sprt\"; did you mean"},
   };
   for (const auto& c : cases) {
