@@ -22,7 +22,7 @@ constexpr double slower = 2;
 bool is_open(const BodyScene& b) {
   const bool has_plane = b.directions_given && b.directions != "all";
   const bool has_keys = b.basis_given || has_plane || b.clamp != "root" || !b.basis.corrections.empty();
-  return !has_keys && b.basis.name == "clamped" && b.structure != "eq14" && b.stiffening != "off";
+  return !has_keys && b.basis.name == "clamped" && b.structure == "beam" && b.stiffening != "off";
 }
 
 bool stiffens(const SteadyMotion& m) { return !m.spin.isZero(0) || !m.acceleration.isZero(0); }

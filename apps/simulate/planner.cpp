@@ -57,6 +57,15 @@ std::string counted(const std::vector<std::string>& kinds) {
   return parts.empty() ? "none" : fmt::format("{}", fmt::join(parts, ", "));
 }
 
+/// What is taken of a basis without a choice, and what is left out.
+std::string words_of_whole(const BodyScene& b, int made, double error) {
+  const std::string taken = b.modes > 0 ? fmt::format("the first {}", b.modes) : "none";
+  return fmt::format(
+      "modes of {}: {} of basis \"{}\"; left out: {} that change the outputs by {:.1e} together with those of all "
+      "bodies",
+      b.name, taken, b.basis.name, made - b.modes, error);
+}
+
 }  // namespace
 
 Planner::Planner(const Scene& scene) {
@@ -327,11 +336,8 @@ std::optional<Planner::Choice> Planner::choose_among_candidates(Scene& scene, co
   const Scene chosen = with_first_of_whole(with_first(open, list, kept_), kept_of_whole_);
   for (const size_t i : open_) {
     const BodyScene& b = scene.bodies[i] = chosen.bodies[i];
-    plan.push_back(has_choice(all, b.name)
-                       ? words_of_choice(b.name, list, moved, search.error())
-                       : fmt::format("modes of {}: the first {} of basis \"{}\"; left out: {} that "
-                                     "change the outputs by {:.1e} together with those of all bodies",
-                                     b.name, b.modes, b.basis.name, most - kept_of_whole_, of_whole.error()));
+    plan.push_back(has_choice(all, b.name) ? words_of_choice(b.name, list, moved, search.error())
+                                           : words_of_whole(b, all.bodies[i].modes, of_whole.error()));
   }
   const auto needed = [](size_t kept, size_t of) {
     return of > 0 ? static_cast<double>(kept) / static_cast<double>(of) : 0;
