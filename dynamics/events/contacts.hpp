@@ -53,7 +53,7 @@ class StopMotion {
   virtual Push push(std::size_t stop, std::span<const char> closed) = 0;
   /// What the error of the method leaves open of a gap.
   virtual double noise(std::size_t stop) const = 0;
-  /// How near a gap is known where it is one number of the state, or is made of several [rad] or [m].
+  /// Round-off of a gap [rad] or [m]. More where it is made of several numbers of the state.
   virtual double place() const { return place_of_one_number; }
   /// Makes the gap zero, where it is one number of the state.
   virtual void put_on_stop(std::size_t) {}
