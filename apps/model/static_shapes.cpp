@@ -100,9 +100,7 @@ std::vector<std::string> loads_without_shapes(const Scene& scene, const BodyScen
 std::string loads_without_stiffness(const Scene& scene, const ReducedBody& body) {
   if (body.n() == 0 || body.Kg.spin.empty()) return {};
   std::vector<std::string> markers = loaded_markers(scene, body.name);
-  const bool has_tip = scene.outputs.empty() || std::ranges::any_of(scene.outputs, [&](const std::string& text) {
-                         return wanted_output(text).name == body.name + ".tip";
-                       });
+  const bool has_tip = scene.outputs.empty() || names_output(scene.outputs, body.name + ".tip");
   if (const Marker* tip = tip_of(body); has_tip && tip != nullptr) markers.push_back(tip->name);
   std::ranges::sort(markers);
   markers.erase(std::unique(markers.begin(), markers.end()), markers.end());

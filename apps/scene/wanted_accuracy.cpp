@@ -58,4 +58,8 @@ std::string_view unit_of(const std::string& output) {
   return found == units.end() ? "" : found->second;
 }
 
+bool names_output(const std::vector<std::string>& wanted, const std::string& output) {
+  return std::ranges::any_of(wanted, [&](const std::string& text) { return wanted_output(text).name == output; });
+}
+
 }  // namespace flexboom

@@ -3,6 +3,7 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace flexboom {
 
@@ -25,6 +26,9 @@ struct WantedOutput {
 
 /// @throws InputError for anything else, and for a unit that is not that of the output.
 WantedOutput wanted_output(const std::string& text);
+
+/// Is this output one of those that are named? @throws InputError as wanted_output.
+bool names_output(const std::vector<std::string>& wanted, const std::string& output);
 
 /// "m/s" of "hub.velocity"; empty of elastic coordinates, drives and energies.
 std::string_view unit_of(const std::string& output);

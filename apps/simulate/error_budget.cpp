@@ -292,11 +292,6 @@ void add(std::vector<OutputDifference>& sum, const std::vector<OutputDifference>
 /// Of the error of time: other parts come beside it.
 Settling settling_of(const Scene& scene) { return {scene.tolerance / 3, 2, bearable_balance(scene.tolerance)}; }
 
-bool is_asked_for(const Scene& scene, const std::string& output) {
-  return std::ranges::any_of(scene.outputs,
-                             [&](const std::string& text) { return wanted_output(text).name == output; });
-}
-
 /// What gravity beyond its gradient changes by way of the motion, which it makes run ahead or behind: measured with a
 /// stronger gradient. Nothing where that is far below the tolerance.
 std::vector<OutputDifference> of_field(const FieldError& field, const Run& run, const Scene& flown,
@@ -352,10 +347,10 @@ double linearisation_error(Scene& scene, Scene& flown, Run& run, Measuring& m) {
   add(differences, of_field(field, run, flown, m.repeats));
   const auto left_out = [&](const OutputErrors& o) {
     if (std::ranges::find(given, o.name) != given.end()) return 0.0;
-    const double drift = !is_asked_for(scene, o.name)    ? 0
-                         : o.name.ends_with(".position") ? field.position
-                         : o.name.ends_with(".velocity") ? field.velocity
-                                                         : 0;
+    const double drift = !names_output(scene.outputs, o.name) ? 0
+                         : o.name.ends_with(".position")      ? field.position
+                         : o.name.ends_with(".velocity")      ? field.velocity
+                                                              : 0;
     return (deflection * deflection + field.share) * o.size + drift;
   };
   return m.enter(&OutputErrors::linearisation, {differences}, left_out);
