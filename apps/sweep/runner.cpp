@@ -78,7 +78,7 @@ namespace {
 void take_modes(BodyScene& b, const BodyScene& planned) {
   b.modes = planned.modes;
   b.open_directions();
-  if (!b.basis_given && b.basis.name != planned.basis.name) b.basis.name = planned.basis.name;
+  if (!b.basis_given) b.basis.name = planned.basis.name;
   if (b.basis.name == "clamped") b.shapes = planned.shapes;
   add_static_shapes(b.basis.corrections, planned.basis.corrections);
 }
