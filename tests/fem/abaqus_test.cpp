@@ -283,6 +283,11 @@ TEST(Abaqus, EquationsPairSetsAndTurnWithTransforms) {
   ASSERT_EQ(mesh.equations.size(), 2U);
   EXPECT_EQ(mesh.equations[1].terms[0].node, 1);
   EXPECT_EQ(mesh.equations[1].terms[1].node, 5);
+  EXPECT_EQ(read(cube + "*NSET, NSET=A\n2, 1\n*NSET, NSET=B\n5, 6\n*EQUATION\n2\nA, 1, 1., B, 1, -1.\n")
+                .mesh.equations[0]
+                .terms[0]
+                .node,
+            0);  // sets are ascending, as they are in Abaqus
 
   // Node 3 slides on the plane whose normal is (1, 1, 0); node 4 is held entirely, which no axes change.
   const std::string turned = cube + "*TRANSFORM, NSET=T\n1, 1, 0, -1, 1, 0\n*NSET, NSET=T\n3, 4\n";
@@ -292,6 +297,28 @@ TEST(Abaqus, EquationsPairSetsAndTurnWithTransforms) {
   for (const auto& term : slides.equations[0].terms) EXPECT_NEAR(term.coefficient, std::sqrt(0.5), 1e-15);
   EXPECT_EQ(held(slides, 4), "123");
   EXPECT_EQ(held(read(turned + "*BOUNDARY\n3, 3\n").mesh, 3), "3");
+}
+
+TEST(Abaqus, PairsOfSetsGoByTheNumbersOfNodes) {
+  // Nodes that stand in another order than their numbers.
+  std::string text = cube;
+  const std::string in_order = "1, 0, 0, 0\n 2, 1., 0, 0.\n";
+  text.replace(text.find(in_order), in_order.size(), "2, 1., 0, 0.\n 1, 0, 0, 0\n");
+  const Mesh mesh = read(text + "*NSET, NSET=A\n1, 2\n*NSET, NSET=B\n5, 6\n*EQUATION\n2\nA, 1, 1., B, 1, -1.\n").mesh;
+  ASSERT_EQ(mesh.equations.size(), 2U);
+  EXPECT_EQ(mesh.node_label(mesh.equations[0].terms[0].node), 1);
+  EXPECT_EQ(mesh.node_label(mesh.equations[0].terms[1].node), 5);
+
+  const auto paired = [](const std::string& members, const std::string& use) {
+    return input_error([&] {
+      read(cube + "*NSET, NSET=A, UNSORTED\n" + members + "\n*NSET, NSET=B\n5, 6\n" + use + "\n", Dialect::abaqus);
+    });
+  };
+  for (const std::string use : {"*EQUATION\n2\nA, 1, 1., B, 1, -1.", "*MPC\nPIN, A, B", "*MPC\nPIN, B, A"}) {
+    EXPECT_TRUE(says(paired("2, 1", use), "UNSORTED")) << use;
+    EXPECT_EQ(paired("1, 2", use), "nothing was thrown") << use;
+  }
+  EXPECT_EQ(paired("2, 1", "*BOUNDARY\nA, 1, 3"), "nothing was thrown");
 }
 
 TEST(Abaqus, CylindricalTransformIsRadialAtEachNode) {

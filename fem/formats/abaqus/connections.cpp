@@ -213,7 +213,7 @@ void Connections::add_equation(const Equation& lines) {
   std::vector<std::vector<int>> nodes;
   size_t count = 1;
   for (const Equation::Term& term : lines.terms) {
-    nodes.push_back(lookup_.nodes(term.node));
+    nodes.push_back(lookup_.nodes_for_pairs(term.node));
     if (nodes.back().size() == 1) continue;
     if (nodes.back().empty() || (count > 1 && nodes.back().size() != count))
       deck_.fail(term.node.text, "the node sets of an equation must have equally many nodes, or one");
@@ -237,8 +237,9 @@ void Connections::add_equation(const Equation& lines) {
 }
 
 void Connections::add_mpc(const Mpc& mpc) {
-  std::vector<int> followers = lookup_.nodes(mpc.follower);
-  const std::vector<int> leaders = lookup_.nodes(mpc.leader);
+  const std::vector<int> leaders = lookup_.nodes_for_pairs(mpc.leader);
+  std::vector<int> followers =
+      leaders.size() == 1 ? lookup_.nodes(mpc.follower) : lookup_.nodes_for_pairs(mpc.follower);
   if (leaders.empty() || followers.empty() || (leaders.size() != 1 && leaders.size() != followers.size()))
     deck_.fail(mpc.at, fmt::format("*MPC: {} nodes cannot follow {}", followers.size(), leaders.size()));
   if (mpc.type == "BEAM" && leaders.size() == 1) {

@@ -53,6 +53,7 @@ struct Set {
   std::string name;
   std::vector<LabelRange> ranges;
   std::vector<Reference> element_sets;  // of a node set: the nodes of their elements
+  bool is_unsorted = false;             // its members have an order of their own
 };
 using Sets = std::map<std::string, Set>;  // by key
 

@@ -141,6 +141,19 @@ std::vector<int> Lookup::nodes(const Reference& reference) const {
   return handed_out(deck_, reference, set->second);
 }
 
+std::vector<int> Lookup::nodes_for_pairs(const Reference& reference) const {
+  std::vector<int> found = nodes(reference);
+  if (found.size() == 1 || deck_.number(reference)) return found;
+  const Set& set = deck_.node_sets.at(deck_.key(reference));
+  const bool is_ascending = set.element_sets.empty() && std::ranges::is_sorted(set.ranges, {}, &LabelRange::first);
+  if (set.is_unsorted && !is_ascending)
+    deck_.fail(reference.text, fmt::format("node set {} is UNSORTED, and pairs of nodes in another order than that of "
+                                           "their numbers are not read; name them one by one",
+                                           quoted(reference.text)));
+  std::ranges::sort(found, {}, [this](int i) { return std::abs(deck_.nodes.labels()[at(i)]); });
+  return found;
+}
+
 int Lookup::node(const Reference& reference) const {
   const std::vector<int> found = nodes(reference);
   if (found.size() != 1)

@@ -21,6 +21,9 @@ class Lookup {
   int node(const Reference&) const;
   /// Of a number or a set, ascending.
   std::vector<int> nodes(const Reference&) const;
+  /// The same by their numbers, where they are paired with those of another. @throws InputError where the deck asks for
+  /// another order.
+  std::vector<int> nodes_for_pairs(const Reference&) const;
   /// Indices into Deck::elements of a number or a set, ascending.
   std::vector<int> elements(const Reference&) const;
   const Surface& surface(const Reference&) const;

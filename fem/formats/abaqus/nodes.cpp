@@ -224,6 +224,7 @@ void read_node_set(Deck& deck, const Keyword& keyword) {
   deck.lines.allow(keyword, {"NSET", "GENERATE", "ELSET", "INSTANCE", "INTERNAL", "UNSORTED"});
   Set& set = set_named(deck, deck.node_sets, deck.lines.need(keyword, "NSET"), keyword);
   if (const auto elements = keyword.find("ELSET")) set.element_sets.push_back(deck.reference(*elements));
+  set.is_unsorted = set.is_unsorted || keyword.has("UNSORTED");
   read_members(deck, keyword, deck.node_sets, set);
 }
 

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <map>
+#include <set>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -125,6 +126,7 @@ struct Bulk {
   std::map<long, std::vector<IdRange>> support_sums, mpc_sums;  // SPCADD, MPCADD: sets
   std::vector<RigidLine> rigids, averages;                      // RBE2, RBE3
   std::vector<MassLine> masses;
+  std::set<long> mass_ids;
   std::map<long, std::optional<int>> methods;  // EIGRL, EIGR: number of modes
   double mass_factor = 1;                      // PARAM,WTMASS
 };

@@ -201,10 +201,9 @@ void Cards::append(std::string_view line, bool first) {
     card_.at = name;
     card_.name = upper_key(name.substr(0, name.find('*')));
   } else {
-    const bool named = name.size() > 1 && mark_.size() > 1;
-    if (named && name.substr(1) != mark_.substr(1))
-      fail(line,
-           fmt::format("continuation {} does not follow the line that ends with {}", quoted(name), quoted(mark_)));
+    if (name.size() > 1 && (mark_.size() <= 1 || name.substr(1) != mark_.substr(1)))
+      fail(line, fmt::format("continuation {} must follow the line that ends with it; the line above ends with {}",
+                             quoted(name), mark_.empty() ? "none" : quoted(mark_)));
     const size_t half = card_.fields.size() % per_line;
     if (half != 0 && !(fields.large && half == large_per_line))
       card_.fields.resize(card_.fields.size() + per_line - half, std::string_view(line.data(), 0));

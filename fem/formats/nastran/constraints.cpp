@@ -174,6 +174,9 @@ void read_param(Bulk& bulk, const Card& card) {
     bulk.mass_factor = bulk.cards.real(card, 1, "WTMASS");
     if (bulk.mass_factor <= 0) bulk.fail(card.field(1), "PARAM,WTMASS must be positive");
     bulk.notes.add(fmt::format("PARAM,WTMASS multiplies every mass by {}", bulk.mass_factor));
+  } else if (name == "CK1" || name == "CM1") {
+    if (bulk.cards.real(card, 1, name) != 1)
+      bulk.fail(card.field(1), fmt::format("PARAM,{} multiplies a whole matrix and is not understood", name));
   } else if (name == "COUPMASS") {
     bulk.notes.add("PARAM,COUPMASS: masses are consistent (coupled) in any case");
   } else if (name == "AUTOSPC") {

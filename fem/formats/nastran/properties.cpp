@@ -188,6 +188,8 @@ void read_other_material(Bulk& bulk, const Card& card) {
 }
 
 void read_conm2(Bulk& bulk, const Card& card) {
+  if (!bulk.mass_ids.insert(bulk.cards.id(card, 0, "element id")).second)
+    bulk.fail(card.at, fmt::format("CONM2 {} is defined twice", card.field(0)));
   MassLine line{bulk.cards.id(card, 1, "grid"), {}, false, card.at};
   if (!card.blank(2) && card.field(2) != "0") {
     if (card.field(2) != "-1") bulk.fail(card.field(2), "CONM2: CID is understood if it is 0 or -1");
