@@ -64,6 +64,7 @@ ModalBasis with_attachment_modes(ModalBasis basis, const Mesh& mesh, const Assem
                                  const std::vector<AttachmentLoad>& loads, int threads) {
   const MatrixXd U = static_shapes(mesh, assembly, clamp, unit_loads(basis, mesh, assembly.dofs, loads));
   const double mass = quadratic_form(assembly.M, rigid_motions(mesh, assembly.dofs).leftCols<1>())(0, 0);
+  const bool is_free = rigid_freedoms(mesh, assembly.dofs, clamp) > 0;
   if (basis.coordinates.empty()) basis.coordinates = mode_table(basis);
   for (size_t i = 0; i < loads.size(); ++i) {
     const VectorXd u = U.col(static_cast<Index>(i));
@@ -80,6 +81,8 @@ ModalBasis with_attachment_modes(ModalBasis basis, const Mesh& mesh, const Assem
     const Index n = basis.Phi.cols();
     basis.Phi.conservativeResize(Eigen::NoChange, n + 1);
     basis.Phi.col(n) = own * (std::sqrt(mass) / norm);
+    if (is_free)  // of what is left of a shape that is nearly in the span, its round-off is a larger part
+      basis.Phi.col(n) = without_rigid_part(mesh, assembly, basis.Phi.col(n));
     const PointEnergies energy = point_energies(mesh, assembly, basis.Phi.rightCols<1>(), threads);
     basis.omega.conservativeResize(n + 1);
     basis.omega(n) = std::sqrt(energy.strain(0) / energy.kinetic(0));
