@@ -94,6 +94,11 @@ Gap Laws::gap(const LawSwitch& s, const LawPoint& p) const {
   return {};
 }
 
+bool Laws::has_latch_at(const Law& law, const std::optional<StopLaw>& rigid_stop) {
+  const auto& latch = law.model.latch;
+  return latch && rigid_stop && std::abs(latch->at - rigid_stop->at) <= round_off_at(latch->at);
+}
+
 /// A rate that is none: the start of a motion may be wrong by so much.
 double Laws::still(const Law& law) const { return 1e-3 * tolerance_ * std::max(law.largest_rate, 1e-6); }
 
@@ -132,7 +137,11 @@ void Laws::arm() {
     if (s.kind == Kind::ramp) side = state.beyond[s.ramp];
     if (s.kind == Kind::push) side = state.pushes[s.ramp], armed = armed && state.beyond[s.ramp];
     if (s.kind == Kind::faster) side = state.faster[s.ramp];
-    if (s.kind == Kind::latch) side = state.past_latch;
+    if (s.kind == Kind::latch) {  // at a rigid stop, a blow is what brings a joint to its latch
+      const Law& law = laws_[s.law];
+      side = state.past_latch;
+      armed = armed && !has_latch_at(law, law.model.upper) && !has_latch_at(law, law.model.lower);
+    }
     if (s.kind == Kind::turn) side = 1, armed = armed && state.motion != Motion::free;
     if (s.kind == Kind::break_forward) armed = held && bounds(laws_[s.law]).upper < infinite;
     if (s.kind == Kind::break_back) armed = held && bounds(laws_[s.law]).lower > -infinite;

@@ -2,6 +2,7 @@
 
 #include "dynamics/events/contacts.hpp"
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -115,6 +116,8 @@ class Laws {
   void let_go(Law&, double load, double t);
   bool let_go_what_slips(LawMotion&, double t);
   void hit(LawMotion&, Law&, double t);
+  void latch(LawMotion&, Law&, double t);
+  static bool has_latch_at(const Law&, const std::optional<StopLaw>& rigid_stop);
   bool is_captured(LawMotion&, Law&, double rebound) const;
   void strike(LawMotion&, Law&, double new_rate, LawLoss);
   void follow_rates(LawMotion&, double t);

@@ -39,12 +39,7 @@ void Laws::apply(LawMotion& motion, const LawSwitch& s, int direction, double t)
     case Kind::latch:
       state.past_latch = direction > 0;
       if (std::abs(way.rate) > law.model.latch->rate || held) return;
-      motion.put(law.joint, law.model.latch->at);
-      event(law, t, EventKind::latch, way.rate);
-      strike(motion, law, 0, LawLoss::latch);
-      state.latched = true;
-      hold(motion, law);
-      return follow_rates(motion, t);
+      return latch(motion, law, t);
     case Kind::hit_upper:
     case Kind::hit_lower:
       motion.put(law.joint, (s.kind == Kind::hit_upper ? law.model.upper : law.model.lower)->at);
@@ -115,19 +110,35 @@ bool Laws::let_go_what_slips(LawMotion& motion, double t) {
   return any;
 }
 
-/// A rigid stop: Newton's rule for the rate, through the inertia of everything that hangs together.
+/// Slow enough, where the latch is.
+void Laws::latch(LawMotion& motion, Law& law, double t) {
+  motion.put(law.joint, law.model.latch->at);
+  event(law, t, EventKind::latch, motion.joint_way(law.joint).rate);
+  strike(motion, law, 0, LawLoss::latch);
+  law.state.latched = true;
+  hold(motion, law);
+  follow_rates(motion, t);
+}
+
+/// A rigid stop: Newton's rule for the rate, through the inertia of everything that hangs together. Where a latch is at
+/// the stop, what arrives or comes back slowly enough is caught.
 void Laws::hit(LawMotion& motion, Law& law, double t) {
   const double rate = motion.joint_way(law.joint).rate;
   const int end = rate > 0 ? 1 : -1;
-  const double restitution = *(end > 0 ? law.model.upper : law.model.lower)->restitution;
-  const double rebound = std::abs(restitution * rate);
+  const std::optional<StopLaw>& stop = end > 0 ? law.model.upper : law.model.lower;
+  const double restitution = *stop->restitution, rebound = std::abs(restitution * rate);
+  const bool has_latch = has_latch_at(law, stop);
+  const auto is_caught = [&](double speed) { return has_latch && speed <= law.model.latch->rate; };
+  if (is_caught(std::abs(rate))) return latch(motion, law, t);
   event(law, t, EventKind::impact, rate);
   law.has_left = false;
   strike(motion, law, -restitution * rate, LawLoss::impact);
+  if (is_caught(rebound)) return latch(motion, law, t);
   if (rebound > still(law)) {
     follow_rates(motion, t);
     if (!is_captured(motion, law, rebound)) return;
     strike(motion, law, 0, LawLoss::impact);
+    if (has_latch) return latch(motion, law, t);
   }
   law.state.rests_at = end;
   follow_rates(motion, t);

@@ -331,7 +331,8 @@ class MultipliersFlight final : public Flight<MultibodyTrajectory>, public DaePr
     }
     for (size_t i = 0; i < laws_.switches().size(); ++i) {
       const int direction = crossed_[contacts_.size() + i], away = laws_.sides()[i] ? -1 : 1;
-      laws_.crossed()[i] = laws_.armed()[i] && direction == away ? away : 0;
+      const bool goes_back = switch_clearance(i, y).slope > 0;  // after a blow, within round-off of the stop
+      laws_.crossed()[i] = laws_.armed()[i] && direction == away && !goes_back ? away : 0;
     }
     watch_.note_drift(t, y, 1e-6 + options_.tolerance, result_.summary);
     if (steps() % 16 == 0) watch_.require_independent(t, y, 1e-7);

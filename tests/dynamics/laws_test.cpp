@@ -195,6 +195,45 @@ TEST_P(Law, LatchLocksAtTheFirstSlowPassAndNothingMovesAfter) {
   expect_balanced(f);
 }
 
+// A latch at a rigid stop, whatever round-off makes of the place: it catches what comes, or comes back, slowly enough.
+TEST_P(Law, LatchAtARigidStopCatchesWhatIsSlowEnoughThere) {
+  constexpr double torque = 0.5, e = 0.5;
+  const auto flown = [&](double at, double rate, double restitution) {
+    JointLaw law;
+    law.preload = at > 0 ? torque : -torque;
+    (at > 0 ? law.upper_stop : law.lower_stop) = StopLaw{.at = at, .restitution = restitution};
+    law.latch = LatchLaw{.at = at, .rate = rate};
+    return fly(one_joint(JointKind::hinge, J, spring(0), law), one_start(0, 0), GetParam(), law_options(1e-10, 8, 0.5));
+  };
+  for (const double at : {0.1, -0.2, 0.3, 0.31, -0.5, 0.7}) {
+    SCOPED_TRACE(at);
+    const double a = torque / J, arrives = std::sqrt(2 * a * std::abs(at)), first = arrives / a;
+    const LawFlight caught = flown(at, 1.01 * arrives, e);
+    EXPECT_EQ(caught.kinds(), "latch");
+    EXPECT_NEAR(caught.events.at(0).time, first, 1e-8);
+    const LawFlight comes_back = flown(at, 0.99 * e * e * arrives, e);  // only after the third blow slow enough
+    EXPECT_EQ(comes_back.kinds(), "impact impact impact latch");
+    EXPECT_NEAR(comes_back.events.at(3).time, first * (1 + 2 * e + 2 * e * e), 1e-7);
+    EXPECT_NEAR(comes_back.coordinate.back()[0], at, digits);
+    EXPECT_EQ(flown(at, 1e-3, 0).kinds(), "impact latch");  // what rests there is slow enough
+  }
+}
+
+// Two stops so near that the second ends what the first began.
+TEST_P(Law, StopsNearEachOtherEndAllBounces) {
+  for (const double upper : {0.301, 0.302, 0.31}) {
+    SCOPED_TRACE(upper);
+    JointLaw law;
+    law.preload = 0.5;
+    law.lower_stop = StopLaw{.at = 0.3, .restitution = 0.5};
+    law.upper_stop = StopLaw{.at = upper, .restitution = 0.5};
+    const LawFlight f =
+        fly(one_joint(JointKind::hinge, J, spring(0), law), one_start(0.3, 0.1), GetParam(), law_options(1e-9, 4, 0.1));
+    EXPECT_EQ(f.events.back().kind, EventKind::rest);
+    EXPECT_NEAR(f.coordinate.back()[0], upper, digits);
+  }
+}
+
 // A quarter of a swing to the edge, the gap at the same rate, and so on: T = 2 pi / omega + 4 b / (omega A).
 TEST_P(Law, PeriodOfASwingWithBacklash) {
   JointLaw law;
