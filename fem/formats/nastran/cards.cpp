@@ -117,6 +117,9 @@ void Cards::case_line(std::string_view line) {
   }
   if (key.starts_with("SOL") && key != "SOL103" && key != "SOLSEMODES" && key != "SOL3")
     case_notes_.push_back(fmt::format("{}: only the modes are computed", line));
+  for (const std::string_view name : {"WTMASS", "CK1", "CM1"})
+    if (key.starts_with(fmt::format("PARAM,{}", name)))
+      fail(line, fmt::format("PARAM,{} is read behind BEGIN BULK alone; put it there", name));
   for (const std::string_view refused : {"STATSUB", "K2GG", "M2GG", "K2PP", "M2PP", "A2GG"}) {
     if (key.starts_with(refused) && key.find('=') != std::string::npos)
       fail(line, fmt::format("{} changes the modes and is not understood", quoted(line)));
