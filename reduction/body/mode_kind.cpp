@@ -124,7 +124,16 @@ std::string_view name_of(ModeKind kind) {
 
 int long_axis(const Mesh& mesh) {
   Index axis = 0;
-  (mesh.nodes.rowwise().maxCoeff() - mesh.nodes.rowwise().minCoeff()).maxCoeff(&axis);
+  const Vector3d extent = mesh.nodes.rowwise().maxCoeff() - mesh.nodes.rowwise().minCoeff();
+  extent.maxCoeff(&axis);
+  const auto root = mesh.node_sets.find("root"), tip = mesh.node_sets.find("tip"), none = mesh.node_sets.end();
+  if (root == none || tip == none || root->second.empty() || tip->second.empty()) return static_cast<int>(axis);
+  const auto middle = [&mesh](const std::vector<int>& nodes) {
+    return Vector3d(mesh.nodes(Eigen::all, nodes).rowwise().mean());
+  };
+  const Vector3d way = middle(tip->second) - middle(root->second);
+  constexpr double apart = 1e-6;
+  if (way.norm() > apart * extent.norm()) way.cwiseAbs().maxCoeff(&axis);
   return static_cast<int>(axis);
 }
 

@@ -13,7 +13,8 @@ namespace flexboom {
 enum class ModeKind { bending_x, bending_y, bending_z, torsion, axial, rigid, other };
 std::string_view name_of(ModeKind);
 
-/// Coordinate axis (0, 1, 2) along which the mesh is longest.
+/// Coordinate axis (0, 1, 2) along which a body runs: from its node set "root" to "tip", as booms do however short they
+/// are. Without these it is the one along which the mesh is longest.
 int long_axis(const Mesh&);
 
 /// Kinds of shapes (freedoms x n) by their kinetic energy. A kind is named when more than half of the energy is the

@@ -47,6 +47,25 @@ TEST(ClampedModes, LineMassBoomHasTheFrequenciesOfEq14) {
   }
 }
 
+// A boom runs from its root to its tip, however short it is.
+TEST(ClampedModes, KindsOfASolidThatIsWiderThanLong) {
+  BeamGeometry stub;
+  const Material aluminium{7e10, 0.3, 2700};
+  stub.segments.push_back({RoundBar{0.03}, RoundBar{0.03}, 0.02, aluminium});
+  const Mesh mesh = make_solid_mesh(stub, SolidOptions{});
+  const Assembly assembly = assemble(mesh);
+  EXPECT_EQ(long_axis(mesh), 0);
+  const ModalBasis basis = clamped_modes(mesh, assembly, node_set(mesh, "root"), first(4));
+  const std::vector<ModeKind> kinds = {ModeKind::bending_y, ModeKind::bending_z, ModeKind::torsion, ModeKind::axial};
+  EXPECT_EQ(basis.kind, kinds);
+  // A quarter of a wave of shear: exact for a round bar on a clamp.
+  EXPECT_NEAR(basis.omega(2) / (std::sqrt(aluminium.shear_modulus() / aluminium.rho) * std::numbers::pi / 0.04), 1,
+              1e-3);
+  Mesh nameless = mesh;
+  nameless.node_sets.clear();
+  EXPECT_NE(long_axis(nameless), 0);
+}
+
 TEST(ClampedModes, FrequenciesAreThoseOfTheReference) {
   const test::Table t = test::read_csv("boom_beam_frequencies_hz.csv");
   const std::vector<std::pair<std::string, BeamGeometry>> cases = {
