@@ -99,8 +99,10 @@ bool Laws::has_latch_at(const Law& law, const std::optional<StopLaw>& rigid_stop
   return latch && rigid_stop && std::abs(latch->at - rigid_stop->at) <= round_off_at(latch->at);
 }
 
-/// A rate that is none: the start of a motion may be wrong by so much.
-double Laws::still(const Law& law) const { return 1e-3 * tolerance_ * std::max(law.largest_rate, 1e-6); }
+/// A rate that is none: the start of a motion may be wrong by so much, and a rate between two bodies by its round-off.
+double Laws::still(const Law& law) const {
+  return std::max(1e-3 * tolerance_ * std::max(law.largest_rate, 1e-6), 100 * round_off_);
+}
 
 /// How far beyond a rigid stop a joint is not yet, where a motion can not be put to a place exactly.
 double Laws::open(const Law& law, double place) const {

@@ -75,13 +75,23 @@ StateScales::StateScales(Equations& equations, const VectorXd& y0, const VectorX
   observe(y0);
 }
 
-/// Where joints hold a body at places known to round-off, that is how well they know what it stretches by.
+/// Where joints hold a body at places known to round-off, that is how well they know how it is turned, and what it
+/// stretches by. A force at r from a middle whose radius of gyration is k moves the place, and turns the body by
+/// r / (k^2 + r^2) of that; joints turn others with it.
 void StateScales::set_least() {
   constexpr double round_off = 4e-15;
+  double turned = 0;  // per length that a place moves [rad/m]
+  for (const JointData& j : equations_.joints())
+    for (const PlaceData* p : {&j.a, &j.b}) {
+      if (p->body < 0) continue;
+      const ReducedBody& b = equations_.scene().bodies[static_cast<size_t>(p->body)];
+      const double r_squared = dot(p->position, p->position);
+      turned = std::max(turned, std::sqrt(r_squared) / (b.J0.trace() / (3 * b.m) + r_squared));
+    }
   for (size_t i = 0; i < equations_.places().size(); ++i) {
     const BodyPlaces& at = equations_.places()[i];
     least_.segment<3>(at.R).setConstant(round_off * length_);
-    least_.segment<4>(at.p).setConstant(round_off);
+    least_.segment<4>(at.p).setConstant(round_off * std::max(1.0, length_ * turned));
     for (int k = 0; k < at.n; ++k) {
       double shape = 0;
       for (const Marker& m : equations_.scene().bodies[i].markers) shape = std::max(shape, m.S.col(k).norm());

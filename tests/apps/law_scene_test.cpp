@@ -180,7 +180,7 @@ TEST(LawScene, StictionAtTheEndOfAnOrbitWithJ2) {
     scene.integrator = integrator;
     const RunResult r = run_scene(scene, {});
     EXPECT_EQ(r.motion.time.back(), 0.5) << integrator;
-    const VectorXd angle = column(r, "hinge.angle");
+    const Eigen::VectorXd angle = column(r, "hinge.angle");
     EXPECT_LT((angle.array() - angle[0]).abs().maxCoeff(), 1e-9) << integrator;
   }
 }
@@ -257,6 +257,57 @@ TEST(LawScene, StateTextReadsBack) {
   EXPECT_EQ(law_state_of(law_state_text(s)), s);
   for (const char* bad : {"", "held", "moves - - - - - -", "held - - - 1 - -", "held - - - 2 1 -"})
     EXPECT_THROW(law_state_of(bad), InputError) << bad;
+}
+
+/// A rigid body on a skew hinge of a hub that turns: the hinge's rate is the difference of rates, with their round-off.
+Scene on_a_turning_hub(double start, const std::string& law) {
+  return parse_scene(fmt::format(R"(format = "flexboom-scene-1"
+name = "turning"
+duration = 0.3
+output_step = 0.02
+[accuracy]
+tolerance = 1e-8
+budget = false
+[[bodies]]
+name = "hub"
+mass = 20.0
+inertia = [2.0, 3.0, 4.0]
+[[bodies]]
+name = "p"
+mass = 2.0
+inertia = [0.2, 0.3, 0.3]
+[[joints]]
+name = "f"
+kind = "free"
+b = {{ body = "hub" }}
+start_omega = [0.3, -0.7, 0.5]
+[[joints]]
+name = "j"
+kind = "hinge"
+a = {{ body = "hub", point = [0.3, 0.2, 0.0], x = [0.6, 0.0, -0.8], z = [0.8, 0.0, 0.6] }}
+b = {{ body = "p" }}
+start = {}
+preload = 0.8
+{}
+)",
+                                 start, law),
+                     "turning.toml");
+}
+
+TEST(LawScene, WhatIsHeldAtTheStartStays) {
+  for (const double start : {-0.123, 0.0, 0.3, 0.7, 1.1, -2.0}) {
+    const std::string stop = fmt::format("upper_stop = {{ at = {}, restitution = 0.5 }}", start);
+    for (const std::string& law : {std::string("friction = { coulomb = 0.05, breakaway = 5.0 }"), stop}) {
+      Scene scene = on_a_turning_hub(start, law);
+      for (const char* formulation : {"relative", "multipliers"}) {
+        scene.formulation = formulation;
+        const RunResult r = run_scene(scene, {});
+        const Eigen::VectorXd angle = column(r, "j.angle");
+        EXPECT_LT((angle.array() - start).abs().maxCoeff(), 1e-12) << start << " " << law << " " << formulation;
+        EXPECT_TRUE(r.motion.events.empty()) << start << " " << law << " " << formulation;
+      }
+    }
+  }
 }
 
 }  // namespace
