@@ -194,6 +194,7 @@ void ResultsFolder::begin(const RunResult& r) {
   // next.
   events_before_ =
       head_of(path_ / "events.csv", true, [left = kept_events_](double) mutable { return left-- > 0; }).rows;
+  drop_events_seen_again(r);
   skips_first_ = start_ > 0 && !on_grid(start_, r.scene.output_step);
   const fs::path frames = path_ / "motion.pvd";
   if (fs::exists(frames)) {
@@ -203,6 +204,20 @@ void ResultsFolder::begin(const RunResult& r) {
   }
   write_file(path_ / "scene.toml", to_toml(r.scene));
   begun_ = true;
+}
+
+/// A joint that slips as a run begins may do so again when a state of that instant goes on.
+void ResultsFolder::drop_events_seen_again(const RunResult& r) {
+  const std::string all = event_rows(r, 0);
+  size_t end = 0;
+  int count = 0;
+  for (const StopEvent& e : r.motion.events) {
+    if (e.time > start_) break;
+    end = all.find('\n', end) + 1, ++count;
+  }
+  if (count == 0 || !events_before_.ends_with(all.substr(0, end))) return;
+  events_before_.resize(events_before_.size() - end);
+  kept_events_ -= count;
 }
 
 void ResultsFolder::write_rows(std::ostream& out, const OutputTable& table, size_t first) const {

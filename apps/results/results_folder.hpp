@@ -45,6 +45,7 @@ class ResultsFolder {
   void set_aside();
   void let_go();
   void begin(const RunResult&);
+  void drop_events_seen_again(const RunResult&);
   void write_rows(std::ostream&, const OutputTable&, size_t first) const;
   void write_summary();
   void write_state(const RunResult&);

@@ -83,21 +83,30 @@ TreeState without_loops(const Scene& scene, TreeState s) {
   return s;
 }
 
-/// The turns of universal joints nearest to the outputs before.
+/// The inverse, with nothing of the joints that close loops.
+TreeState with_loops(const Scene& scene, const TreeState& open) {
+  TreeState s;
+  auto next = open.joints.begin();
+  for (const JointScene& j : scene.joints) s.joints.push_back(j.closes_loop ? JointState{} : *next++);
+  return s;
+}
+
+/// The turns of universal joints nearest to those before.
 void follow_turns(const TreeState& before, TreeState& s) {
   constexpr double turn = 2 * std::numbers::pi;
   for (size_t i = 0; i < s.joints.size(); ++i)
-    for (size_t k = 0; s.joints[i].coordinate.size() == 2 && k < 2; ++k) {
+    for (size_t k = 0; s.joints[i].coordinate.size() == 2 && k < before.joints[i].coordinate.size(); ++k) {
       double& angle = s.joints[i].coordinate[k];
       angle += turn * std::round((before.joints[i].coordinate[k] - angle) / turn);
     }
 }
 
-/// Those of the rows that `states` does not have yet.
-void add_states(const Multipliers& system, const MultibodyTrajectory& flight, std::vector<TreeState>& states) {
+/// Those of the rows that `states` does not have yet, after `start`.
+void add_states(const Multipliers& system, const MultibodyTrajectory& flight, const TreeState& start,
+                std::vector<TreeState>& states) {
   while (states.size() < flight.states.size()) {
     TreeState s = tree_state(system, flight.states[states.size()]);
-    if (!states.empty()) follow_turns(states.back(), s);
+    follow_turns(states.empty() ? start : states.back(), s);
     states.push_back(std::move(s));
   }
 }
@@ -275,7 +284,7 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
     checkpoint = [&](const MultibodyTrajectory& so_far, size_t outputs) {
       effect = largest_stiffening(*system, so_far);
       if (will_be_revised(scene, opened, effect, stiffening)) return;
-      add_states(*system, so_far, states);
+      add_states(*system, so_far, with_loops(scene, asked), states);
       Run part = r;
       part.motion.stiffening_effect = effect;
       set_flown({scene, *system, *r.tree, so_far, states}, told, outputs, stiffening, part);
@@ -306,7 +315,7 @@ Run fly_by_multipliers(const Scene& scene, std::vector<PreparedBody> bodies, con
   };
   fly_until_settled(scene, opened, effect, stiffening, fly);
   r.motion.stiffening_effect = effect;
-  add_states(*system, flight, states);
+  add_states(*system, flight, with_loops(scene, asked), states);
   set_flown({scene, *system, *r.tree, flight, states}, 0, states.size(), stiffening, r);
   note_unseen_stiffening(all, stiffening, r.motion.stiffening_effect, r.motion.warnings);
   note_moved_starts(scene, asked, states.front(), r.notes);

@@ -95,6 +95,82 @@ TEST_P(Continue, FlexibleBodiesOnJoints) {
   expect_same(whole, first, later, 1e-5, 0);
 }
 
+// Their attitudes do not tell how often they have turned.
+TEST(ContinueScene, UniversalJointsKeepTheirTurns) {
+  Scene scene = parse_scene(R"toml(format = "flexboom-scene-1"
+name = "turns"
+duration = 4.0
+output_step = 0.1
+[accuracy]
+tolerance = 1e-8
+budget = false
+[[bodies]]
+name = "rotor"
+mass = 1.0
+inertia = [0.1, 0.1, 0.2]
+[[joints]]
+name = "u"
+kind = "universal"
+b = { body = "rotor" }
+start_rate = [2.0, 0.0]
+)toml",
+                            "turns.toml");
+  for (const char* of_first : {"relative", "multipliers"})
+    for (const char* of_later : {"relative", "multipliers"}) {
+      scene.formulation = of_first;
+      const RunResult first = fly(scene, 1.8);
+      scene.formulation = of_later;
+      const RunResult second = fly(scene, 3, &first), third = fly(scene, 4, &second);
+      for (const RunResult* part : {&second, &third}) {
+        const VectorXd t = column(*part, "t"), angle = column(*part, "u.angle1");
+        EXPECT_LT((angle - 2 * t).cwiseAbs().maxCoeff(), 1e-7) << of_first << " " << of_later;
+      }
+    }
+  scene.joints[0].start = {4, 0}, scene.formulation = "multipliers";
+  EXPECT_NEAR(column(fly(scene, 1), "u.angle1")[0], 4, 1e-12);
+}
+
+// Round-off of places far from the orbit's reference is that of attitudes, too, where an arm joins two bodies.
+TEST(ContinueScene, FarFromTheReferenceOfAnOrbit) {
+  Scene scene = parse_scene(R"toml(format = "flexboom-scene-1"
+name = "far"
+duration = 12000.0
+output_step = 100.0
+[accuracy]
+tolerance = 1e-10
+budget = false
+[orbit]
+altitude = 500e3
+eccentricity = 0.3
+gravity = "differential"
+[[bodies]]
+name = "hub"
+mass = 120.0
+inertia = [20.0, 14.0, 9.0]
+[[bodies]]
+name = "tip"
+mass = 10.0
+inertia = [0.1, 0.1, 0.02]
+[[joints]]
+kind = "free"
+b = { body = "hub" }
+start_omega = [0.0004, -0.0012, 0.0003]
+start_velocity = [0.01, 0.02, -0.03]
+[[joints]]
+name = "arm"
+kind = "fixed"
+a = { body = "hub", point = [0.0, 0.0, 3.0] }
+b = { body = "tip" }
+)toml",
+                            "far.toml");
+  const RunResult whole = fly(scene, 12000), first = fly(scene, 7000);
+  EXPECT_GT(column(first, "hub.position.x").cwiseAbs().maxCoeff(), 100);
+  scene.formulation = "multipliers";
+  const RunResult later = fly(scene, 12000, &first);
+  expect_same(whole, first, later, 1e-7, 0);  // 3e-8 of the work of gravity, 1e-9 of the rest
+  EXPECT_LT(later.motion.summary.steps, 30'000);
+}
+
 // With few digits, so that booms come to rest on their stops.
 TEST(ContinueScene, WhatHasSettledStaysSettled) {
   Scene scene = scene_named("sport");

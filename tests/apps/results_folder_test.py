@@ -308,6 +308,20 @@ class Killed(Kills):
         run("--duration", "14", "--continue", out, "--out", out)
         self.assertEqual([e[1:] for e in cli.read_csv(out / "events.csv")], [e[1:] for e in events])
 
+    def test_what_happens_as_a_run_begins(self):
+        """The hinge slips at 0 s, of which the first state is: it slips again when that goes on, and is listed once."""
+        arguments = ["run", "latching-panel", "--no-budget", "--tolerance", "1e-9", "--duration", "5", "--out"]
+        whole, out = self.folder / "whole", self.folder / "out"
+        self.assert_exit(OK, flexboom(*arguments, whole))
+        process = self.start(*arguments, out)
+        self.wait_for(lambda: self.state_time(out) is not None, "no state")
+        process.kill()
+        process.wait()
+        self.assert_exit(OK, flexboom(*arguments, out, "--continue", out))
+        events = [[e[1:] for e in cli.read_csv(folder / "events.csv")] for folder in (whole, out)]
+        self.assertEqual(events[0][1], ["hinge", "slip"])
+        self.assertEqual(events[1], events[0])
+
     def test_a_last_line_that_is_cut_off(self):
         process, folder = self.start_endless(after=0.2)
         process.kill()
