@@ -138,7 +138,8 @@ struct CommandLine {
     c->add_option("--basis", reduce.basis,
                   "clamped, hinge, mean-axis, craig-bampton or prestressed (default: the file's)")
         ->check(CLI::IsMember(std::vector<std::string>(basis_names.begin(), basis_names.end())));
-    c->add_option("--count", reduce.count, "Modes (default: what the file asks for, or 10; of a hinge per stiffness)");
+    c->add_option("--count", reduce.count,
+                  "Modes (default: what the file asks for, or 10; basis hinge: per stiffness, 1)");
     c->add_option("--backend", reduce.backend, "Eigen-solver: auto, arpack, block, spectra or dense");
     c->add_option("--clamp", reduce.options.clamp,
                   "Node set that is fixed (default: the body's, or the file's supports)");

@@ -5,6 +5,7 @@
 #include "apps/model/picture.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
+#include "fem/booms/beam_limits.hpp"
 #include "fem/formats/common/mesh_file.hpp"
 #include "fem/formats/vtk/vtk.hpp"
 #include "reduction/invariants/inertia_invariants.hpp"
@@ -171,6 +172,12 @@ int modes_command(const ModesArguments& a, const CommonOptions& common) {
   const EigenOptions options = eigen_options(a, model);
   BoundedModes m = bounded_modes(std::move(model), options, common.threads);
   m.mesh_seconds += load_seconds;
+  if (m.model.body && m.model.body->structure == "beam")
+    if (std::string doubt = section_doubt(m.model.body->geometry, m.basis.omega.maxCoeff() / (2 * std::numbers::pi));
+        !doubt.empty()) {
+      if (!common.quiet) print_note("note: " + doubt);
+      m.model.notes.push_back(std::move(doubt));
+    }
   if (!a.vtu.empty()) write_vtu(a.vtu, shapes_grid(m));
   progress.reset();
   if (common.json) {

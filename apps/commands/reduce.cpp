@@ -1,6 +1,7 @@
 #include "apps/commands/commands.hpp"
 #include "apps/commands/terminal_line.hpp"
 #include "apps/model/body_text.hpp"
+#include "apps/model/reduction.hpp"
 #include "apps/model/richer_bodies.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
@@ -9,6 +10,8 @@
 
 #include <algorithm>
 #include <optional>
+#include <string>
+#include <utility>
 
 namespace flexboom {
 
@@ -23,6 +26,9 @@ int reduce_command(const ReduceArguments& a, const CommonOptions& common) {
   const ReductionOptions options = reduction_options(a, model);
   const Model loaded = model;  // the reduction may add to its mesh
   const ReducedBody body = make_reduced_body(model, options, common.threads, seconds);
+  if (model.body && model.body->structure == "beam")
+    if (std::string doubt = doubt_of_modes(model.body->geometry, body); !doubt.empty())
+      model.notes.push_back(std::move(doubt));
   const Stopwatch richer_clock;
   const RicherBodies richer = richer_bodies(loaded, options, body, a.errors, common.threads, model.notes);
   seconds.richer = richer_clock.seconds();

@@ -4,6 +4,7 @@
 #include "apps/commands/terminal_line.hpp"
 #include "apps/results/report.hpp"
 #include "apps/results/results_folder.hpp"
+#include "apps/scene/scene_keys.hpp"
 #include "dynamics/methods/integrator.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/files.hpp"
@@ -347,8 +348,12 @@ void print_faults(const std::string& text) {
 
 /// What `check` says of a file without faults.
 nlohmann::ordered_json checked(const std::string& name) {
-  if (is_body_file(name))
-    return {{"body", read_body(name).name}, {"warnings", nlohmann::ordered_json::array()}, {"ok", true}};
+  if (is_body_file(name)) {
+    const BodyScene body = read_body(name);
+    std::vector<std::string> warnings;
+    warn_of_body(body, warnings);
+    return {{"body", body.name}, {"warnings", warnings}, {"ok", true}};
+  }
   const Scene scene = load_scene(name);
   const bool certified = std::ranges::all_of(scene.bodies, [](const BodyScene& b) {
     return !b.reduced || std::ranges::all_of(b.reduced->certificate, &BodyCheck::passed);

@@ -5,6 +5,7 @@
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 #include "fem/base/text_reader.hpp"
+#include "fem/booms/beam_limits.hpp"
 #include "fem/linear_algebra/inertia.hpp"
 #include "fem/mesh/mesh_sets.hpp"
 #include "reduction/basis/mode_selection.hpp"
@@ -123,7 +124,7 @@ std::string note_of_supports(const Model& model, const BasisModel& m, const Basi
   return !beside ? ""
                  : fmt::format(
                        "craig-bampton: supports of the mesh hold it to the frame of \"{}\", too, wherever that "
-                       "flies; --free leaves them out",
+                       "flies; a file without supports leaves them out",
                        o.reference);
 }
 
@@ -190,6 +191,14 @@ ReducedBody make_reduced_body(Model& model, const ReductionOptions& options, int
                      fmt::format("{}", fmt::join(material_suspicions(model.mesh), "; "))};
   body.validate();
   return body;
+}
+
+std::string doubt_of_modes(const BeamGeometry& boom, const ReducedBody& body) {
+  double highest = 0;
+  for (const Coordinate& c : body.coordinates)
+    if (c.kind.starts_with("bending") || c.kind == "torsion") highest = std::max(highest, c.frequency_hz);
+  const std::string doubt = section_doubt(boom, highest);
+  return doubt.empty() ? "" : fmt::format("its modes reach {:.3g} Hz; {}", highest, doubt);
 }
 
 }  // namespace flexboom

@@ -32,4 +32,7 @@ struct ReductionOptions {
 /// @throws InputError for a place that the model lacks, NumericalError as the bases.
 ReducedBody make_reduced_body(Model& model, const ReductionOptions&, int threads, ReductionSeconds& seconds);
 
+/// Where a body of beams has modes at whose frequencies its section itself vibrates, in words; empty: nowhere.
+std::string doubt_of_modes(const BeamGeometry&, const ReducedBody&);
+
 }  // namespace flexboom

@@ -1,6 +1,7 @@
 #include "apps/scene/scene.hpp"
 #include "apps/scene/scene_keys.hpp"
 #include "apps/scene/tree_scene.hpp"
+#include "fem/booms/beam_limits.hpp"
 #include "fem/mesh/mesh.hpp"
 
 #include <fmt/format.h>
@@ -145,11 +146,17 @@ void warn_of_mechanisms(const Scene& scene, Warnings& warnings) {
     }
 }
 
-/// Slits of beams, materials that are none, bodies that hardly vibrate, files that fail their own checks.
+}  // namespace
+
 void warn_of_body(const BodyScene& b, Warnings& warnings) {
   if (b.is_boom() && b.structure != "solid" && b.solid.slit > 0)
     warnings.push_back(
         fmt::format("body {}: its slit is one of structure = \"solid\"; a {} has none", b.name, b.structure));
+  if (b.is_boom() && (b.structure == "beam" || b.structure == "eq14")) {
+    const bool in_plane = b.directions != "all" && (b.directions_given || !b.modes_auto);
+    if (const std::string doubt = beam_doubt(b.geometry, in_plane); !doubt.empty())
+      warnings.push_back(fmt::format("body {}: {}", b.name, doubt));
+  }
   for (const BeamSegment& segment : b.geometry.segments)
     if (const std::string odd = suspicion(segment.material); b.is_boom() && !odd.empty())
       warnings.push_back(fmt::format("body {}: {}", b.name, odd));
@@ -166,8 +173,6 @@ void warn_of_body(const BodyScene& b, Warnings& warnings) {
           fmt::format("body {}: its file {} fails its own check \"{}\": {:.6g}, not {:.6g}; make it anew", b.name,
                       b.reduced_file.string(), c.name, c.value, c.reference));
 }
-
-}  // namespace
 
 void warn_of_oddities(const Scene& scene, std::vector<std::string>& warnings) {
   warn_of_points(scene, warnings);

@@ -1,6 +1,7 @@
 #include "apps/simulate/simulate.hpp"
 
 #include "apps/base/deflection.hpp"
+#include "apps/model/reduction.hpp"
 #include "apps/model/static_shapes.hpp"
 #include "apps/scene/wanted_accuracy.hpp"
 #include "apps/simulate/error_budget.hpp"
@@ -232,6 +233,12 @@ void add_warnings(const Run& run, RunResult& r) {
   for (const PreparedBody& p : run.bodies)  // which the budget says, where it is measured
     if (std::string lack = loads_without_stiffness(r.scene, p.body); !lack.empty() && !r.budget.measured)
       r.warnings.push_back(std::move(lack));
+  for (size_t i = 0; i < run.bodies.size(); ++i) {
+    const auto body = std::ranges::find(r.scene.bodies, run.bodies[i].body.name, &BodyScene::name);
+    if (body == r.scene.bodies.end() || !body->is_boom() || body->structure != "beam") continue;
+    if (const std::string doubt = doubt_of_modes(body->geometry, run.bodies[i].body); !doubt.empty())
+      r.warnings.push_back(fmt::format("body {}: {}", body->name, doubt));
+  }
   constexpr Eigen::Index few = 5;
   if (const Eigen::Index rows = run.outputs.values.rows(); r.budget.measured && rows < few)
     r.warnings.push_back(
