@@ -37,21 +37,24 @@ double by_warping(double width, double share, double length, double nu) {
   return shorter / std::max(length - shorter, 0.1 * length);
 }
 
-struct Of {
+/// Of a section of one material in a boom of this length.
+struct Estimate {
   double length;
   const Material& material;
 
+  /// Where fibres give G, E / (2 G) - 1 tells nothing of how a section curves across.
+  double poisson() const { return std::abs(material.nu) < 0.5 ? material.nu : 0; }
   /// Angular frequency of a plate of this thickness that is bent in waves of 1 / k: k^2 times this [m^2/s].
   double plate(double thickness) const {
-    const double nu = material.nu;
+    const double nu = poisson();
     return material.rho > 0 ? thickness * std::sqrt(material.E / (12 * material.rho * (1 - nu * nu))) : none;
   }
   static double hertz(double omega) { return omega / (2 * std::numbers::pi); }
 
   BeamLimits bent(double height, double width, double thickness) const {
     BeamLimits r;
-    r.bending_y = by_clamped_face(height, width, thickness, length, material.nu);
-    r.bending_z = by_clamped_face(width, height, thickness, length, material.nu);
+    r.bending_y = by_clamped_face(height, width, thickness, length, poisson());
+    r.bending_z = by_clamped_face(width, height, thickness, length, poisson());
     return r;
   }
 
@@ -82,11 +85,11 @@ struct Of {
 
 BeamLimits beam_limits(const BeamGeometry& boom) {
   const double length = boom.length();
-  BeamLimits r = std::visit(Of{length, boom.segments.front().material}, boom.segments.front().start);
+  BeamLimits r = std::visit(Estimate{length, boom.segments.front().material}, boom.segments.front().start);
   for (const BeamSegment& segment : boom.segments)
     for (const SectionShape& shape : {segment.start, segment.end})
       r.section_frequency =
-          std::min(r.section_frequency, std::visit(Of{length, segment.material}, shape).section_frequency);
+          std::min(r.section_frequency, std::visit(Estimate{length, segment.material}, shape).section_frequency);
   return r;
 }
 

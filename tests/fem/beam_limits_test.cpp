@@ -71,6 +71,17 @@ TEST(BeamLimits, SectionsVibrateWhereSolidsDo) {
   EXPECT_TRUE(std::isinf(frequency(GeneralSection{1e-4, 1e-9, 1e-9, 1e-9})));
 }
 
+// E / (2 G) - 1 of a laminate is no Poisson's ratio.
+TEST(BeamLimits, OfFibresHaveNoPoissonsRatio) {
+  for (const double nu : {-0.9, 0.7, 5.0}) {
+    const BeamLimits found = beam_limits(boom(Rectangle{0.02, 0.8}, 1.2, nu)),
+                     none = beam_limits(boom(Rectangle{0.02, 0.8}, 1.2, 0));
+    EXPECT_EQ(found.bending_y, 0) << nu;
+    EXPECT_EQ(found.section_frequency, none.section_frequency) << nu;
+    EXPECT_EQ(found.torsion > none.torsion, nu > 0) << nu;  // E / G is what resists warping
+  }
+}
+
 TEST(BeamLimits, AreSaidWhereTheyCount) {
   EXPECT_EQ(beam_doubt(boom(RoundBar{0.005}, 0.295)), "");
   EXPECT_EQ(beam_doubt(boom(GeneralSection{1e-4, 1e-9, 1e-9, 1e-9}, 0.1)), "");
