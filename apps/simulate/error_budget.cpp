@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -136,16 +137,28 @@ struct Finding {
 
 using Part = double OutputErrors::*;
 
-/// The truncation of an output for what as many modes more change. A motion converges like 1 / n^2 or faster, so that
-/// they change three quarters of the error or more. A jump of an acceleration rings all modes of a body, and a load of
-/// its joint converges like their effective mass: as 1 / n. What as many modes more change is then half of the error.
-double truncation_per_change(const std::string& output) { return is_load(output) ? 2 : 1.25; }
+/// Rates of joints that do not float converge as 1 / n where a torque is there at once. It turns the root of a body as
+/// fast as that part of it turns which has felt it: more modes, a smaller part.
+bool is_rate_of_joint(const std::string& output, const Scene& scene) {
+  return std::ranges::any_of(with_joints(scene).joints, [&output](const JointScene& joint) {
+    return !joint_type(joint.kind).floats && output.starts_with(joint.name + ".rate");
+  });
+}
 
 /// What fills a budget.
 struct Measuring {
   Repeats repeats;
   std::vector<std::string>& plan;
   ErrorBudget budget{};
+  std::set<std::string> slow{};  // rates that converge as loads do
+  double slow_per_change = 2;    // their truncation for what the modes beyond change
+
+  /// The truncation of an output for what modes beyond change. A motion converges like 1 / n^2 or faster, so that as
+  /// many modes more change three quarters of the error or more. A jump of an acceleration rings all modes of a body,
+  /// and a load of its joint converges like their effective mass: as 1 / n. As many modes more change half of it then.
+  double truncation_per_change(const std::string& output) const {
+    return is_load(output) ? 2 : slow.contains(output) ? slow_per_change : 1.25;
+  }
 
   /// Would these truncations keep the tolerance with the other parts, though the repeat has an error of time of its
   /// own?
@@ -211,6 +224,19 @@ std::optional<Beyond> modes_beyond(const Scene& scene, const Scene& flown, const
   return r;
 }
 
+/// Of the body where they are most.
+double modes_by_modes_beyond(const Scene& flown, const Scene& richer) {
+  const auto modes = [](const BodyScene& b) {
+    return b.reduced ? b.reduced->n() : b.shapes.empty() ? b.modes : static_cast<int>(std::ssize(b.shapes));
+  };
+  double most = 0;
+  for (size_t i = 0; i < flown.bodies.size(); ++i) {
+    const int all = modes(richer.bodies[i]), beyond = all - modes(flown.bodies[i]);
+    if (beyond > 0) most = std::max(most, static_cast<double>(all) / beyond);
+  }
+  return most;
+}
+
 /// What modes beyond those of a run change, and what still more would.
 Finding truncation_of(std::optional<Beyond> beyond, const Run& run, const Scene& flown, const Measuring& m) {
   if (!beyond) return {};
@@ -228,7 +254,7 @@ Finding truncation_of(std::optional<Beyond> beyond, const Run& run, const Scene&
     more.tolerance = flown.tolerance, more.integrator_tolerance = flown.integrator_tolerance;
     r.differences = repeats.change(run, more, time_error, 0, borne);
   }
-  for (OutputDifference& d : r.differences) d.error *= truncation_per_change(d.name);
+  for (OutputDifference& d : r.differences) d.error *= m.truncation_per_change(d.name);
   return r;
 }
 
@@ -370,6 +396,7 @@ ErrorBudget budget_by_repeats(Scene& scene, Run& run, const RunHooks& hooks, std
     budget.outputs.push_back({});
     OutputErrors& o = budget.outputs.back();
     o.name = d.name, o.scale = d.scale, o.size = d.size;
+    if (is_rate_of_joint(o.name, scene)) m.slow.insert(o.name);
   }
   const auto measured = [&m, &hooks](std::string_view part, const auto& repeat) {
     if (hooks.stopped()) return unknown;
@@ -389,7 +416,9 @@ ErrorBudget budget_by_repeats(Scene& scene, Run& run, const RunHooks& hooks, std
     give_up_ahead(hooks);
     const double found = measured("truncation", [&] {
       beyond = modes_beyond(scene, flown, budget.has_stiffened ? StillKinds{} : still, budget, hooks);
-      if (beyond) fly_ahead(beyond->scene, hooks, 0, bearable_steps(run));
+      if (!beyond) return 0.0;
+      m.slow_per_change = std::max(2.0, modes_by_modes_beyond(flown, beyond->scene));
+      fly_ahead(beyond->scene, hooks, 0, bearable_steps(run));
       return 0.0;
     });
     has_beyond = !std::isnan(found);

@@ -159,6 +159,65 @@ TEST(BudgetOfATree, CountsWhatManyModesDoToTheLoadOfAJoint) {
   EXPECT_LT(few.budget.truncation, 4 * error);
 }
 
+// A spring lets a light boom go. Its root turns as fast as that part of it which has felt the spring.
+TEST(BudgetOfATree, CountsWhatManyModesDoToTheRateOfAJoint) {
+  Scene scene = parse_scene(R"toml(format = "flexboom-scene-1"
+name = "snap"
+duration = 0.06
+output_step = 0.002
+[accuracy]
+tolerance = 1e-2
+outputs = ["hinge.rate"]
+[[bodies]]
+name = "arm"
+modes = 14
+directions = "all"
+stiffening = "on"
+damping = { rule = "modal", value = 0.002 }
+corrections = ["mid.Fy", "mid.Fz", "mid.My", "mid.Mz", "mid.Mx", "mid.Fx"]
+[[bodies.segments]]
+shape = "round-bar"
+diameter = 0.012
+length = 0.54
+material = { E = 7e9, nu = 0.33, rho = 2700 }
+[[bodies.attachments]]
+name = "mid"
+position = 0.27
+mass = 0.5
+[[bodies]]
+name = "boom"
+modes = 14
+directions = "all"
+stiffening = "on"
+[[bodies.segments]]
+shape = "round-bar"
+diameter = 0.012
+length = 0.5
+material = { E = 70e9, nu = 0.33, rho = 2700 }
+[[joints]]
+name = "clamp"
+kind = "fixed"
+b = { body = "arm", marker = "root" }
+[[joints]]
+name = "hinge"
+kind = "hinge"
+a = { body = "arm", marker = "mid", x = [1,0,0], z = [0, 0, 1] }
+b = { body = "boom", marker = "root" }
+start = 0
+stiffness = 50
+rest = 0.2
+damping = 0.5
+)toml",
+                            "snap.toml");
+  const RunResult few = run_scene(scene, {});
+  for (BodyScene& b : scene.bodies) b.modes = 40;
+  scene.error_budget = false;
+  const RunResult many = run_scene(scene, {});
+  const double error = largest(compare_outputs(few.outputs, many.outputs, scene.outputs));
+  EXPECT_GT(few.budget.truncation, error);  // what four modes more of each kind change, by 1.25: 0.85 of it
+  EXPECT_LT(few.budget.truncation, 3 * error);
+}
+
 // A stiff boom that rings undamped: the method by multipliers damps it far faster than asked, and says so.
 TEST(NoBudget, AnUnbalancedMotionIsWarnedOf) {
   Scene scene =
