@@ -4,7 +4,6 @@
 #include "apps/model/prepared_body.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/text_reader.hpp"
-#include "fem/booms/beam_limits.hpp"
 #include "fem/formats/mesh_formats.hpp"
 
 #include <fmt/format.h>
@@ -94,10 +93,8 @@ std::optional<Model> refined_if_bearable(const Model& model, int steps) {
 
 Model load_model(const std::filesystem::path& path, const ModelOptions& options) {
   Model model = path.extension() == ".toml" ? body_model(path, options) : file_model(path, options);
-  if (model.body && model.body->structure == "beam" && model.body->solid.slit > 0)
-    model.notes.emplace_back("the slit is one of structure = \"solid\"; a beam has none");
-  if (model.body && model.body->structure == "beam")
-    if (std::string doubt = beam_doubt(model.body->geometry); !doubt.empty()) model.notes.push_back(std::move(doubt));
+  if (model.body)
+    for (std::string& doubt : doubts_of_beams(*model.body)) model.notes.push_back(std::move(doubt));
   for (std::string& suspicion : suspicions(model.mesh)) model.notes.push_back(std::move(suspicion));
   return model;
 }

@@ -152,6 +152,9 @@ Scene parse_scene(const std::string& text, const std::string& file_name, const s
 Scene read_scene(const toml_reader::Value& root, const std::filesystem::path& folder);
 BodyScene read_body(const std::filesystem::path&);
 
+/// What beams or the closed form leave out of a boom: its slit, beam_doubt. Of a solid nothing. `in_plane`: as there.
+std::vector<std::string> doubts_of_beams(const BodyScene&, bool in_plane = false);
+
 /// A path, or the name of a built-in scene ("sport"). @throws InputError listing the built-in names.
 Scene load_scene(const std::string& path_or_name);
 

@@ -95,8 +95,7 @@ void spell_sets(BodyScene&);
 
 /// What is not wrong but may not be meant: springs that press on stops, starts beyond them.
 void warn_of_oddities(const Scene&, std::vector<std::string>& warnings);
-/// Slits of beams, booms that are none, materials that are none, bodies that hardly vibrate, files that fail their own
-/// checks.
+/// doubts_of_beams, materials that are none, bodies that hardly vibrate, files that fail their own checks.
 void warn_of_body(const BodyScene&, std::vector<std::string>& warnings);
 
 /// Paths of every key that the readers of a scene look for, "bodies[].name".

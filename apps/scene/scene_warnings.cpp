@@ -148,15 +148,20 @@ void warn_of_mechanisms(const Scene& scene, Warnings& warnings) {
 
 }  // namespace
 
+Warnings doubts_of_beams(const BodyScene& b, bool in_plane) {
+  Warnings doubts;
+  if (!b.is_boom() || b.structure == "solid") return doubts;
+  if (b.solid.slit > 0)
+    doubts.push_back(fmt::format("its slit is one of structure = \"solid\"; a {} has none", b.structure));
+  if (b.structure == "rigid") return doubts;
+  if (std::string doubt = beam_doubt(b.geometry, in_plane); !doubt.empty()) doubts.push_back(std::move(doubt));
+  return doubts;
+}
+
 void warn_of_body(const BodyScene& b, Warnings& warnings) {
-  if (b.is_boom() && b.structure != "solid" && b.solid.slit > 0)
-    warnings.push_back(
-        fmt::format("body {}: its slit is one of structure = \"solid\"; a {} has none", b.name, b.structure));
-  if (b.is_boom() && (b.structure == "beam" || b.structure == "eq14")) {
-    const bool in_plane = b.directions != "all" && (b.directions_given || !b.modes_auto);
-    if (const std::string doubt = beam_doubt(b.geometry, in_plane); !doubt.empty())
-      warnings.push_back(fmt::format("body {}: {}", b.name, doubt));
-  }
+  const bool in_plane = b.directions != "all" && (b.directions_given || !b.modes_auto);
+  for (const std::string& doubt : doubts_of_beams(b, in_plane))
+    warnings.push_back(fmt::format("body {}: {}", b.name, doubt));
   for (const BeamSegment& segment : b.geometry.segments)
     if (const std::string odd = suspicion(segment.material); b.is_boom() && !odd.empty())
       warnings.push_back(fmt::format("body {}: {}", b.name, odd));
