@@ -107,10 +107,13 @@ ModalBasis joined(const Plan& plan, const MatrixXd& Psi_c, const ModalBasis& nor
   return basis;
 }
 
-/// The modes in the span of the basis as coordinates.
+/// The modes in the span of the basis as coordinates. Rigid ones have no frequency: what strain energy round-off leaves
+/// to them is none.
 ModalBasis diagonal(const ModalBasis& basis, const Mesh& mesh, const Assembly& assembly, const Clamp& clamp,
                     int threads) {
   ModalBasis modes = ritz_modes(mesh, assembly, clamp, basis.Phi, basis.rigid_freedoms, threads);
+  modes.omega.head(basis.rigid_freedoms).setZero();
+  for (int k = 0; k < basis.rigid_freedoms; ++k) modes.coordinates[static_cast<size_t>(k)].frequency_hz = 0;
   modes.unknowns = basis.unknowns;
   modes.interfaces = basis.interfaces;
   modes.interface_nodes = basis.interface_nodes;

@@ -37,9 +37,19 @@ BodyCheck vanishing(std::string name, double size, double limit) {
   return {std::move(name), size, 0, size, size <= limit};
 }
 
+bool is_rigid(const Coordinate& c) { return c.kind == name_of(ModeKind::rigid); }
+
 bool all_modes(const ReducedBody& body) {
-  return std::ranges::all_of(body.coordinates,
-                             [](const Coordinate& c) { return c.interface.empty() && c.frequency_hz > 0; });
+  return std::ranges::all_of(
+      body.coordinates, [](const Coordinate& c) { return c.interface.empty() && (c.frequency_hz > 0 || is_rigid(c)); });
+}
+
+/// The coordinates that store strain energy: round-off of the others has no scale.
+std::vector<int> elastic(const ReducedBody& body) {
+  std::vector<int> list;
+  for (int k = 0; k < body.n(); ++k)
+    if (!is_rigid(body.coordinates[static_cast<size_t>(k)])) list.push_back(k);
+  return list;
 }
 
 void add_bessel(std::vector<BodyCheck>& checks, const ReducedBody& body) {
@@ -150,7 +160,8 @@ std::vector<BodyCheck> body_checks(const ReducedBody& body) {
   if (body.frame == "mean-axis") add_mean_axes(checks, body);
   if (all_modes(body)) {
     checks.push_back(vanishing("Me off its diagonal", coupling(body.Me), orthogonal));
-    checks.push_back(vanishing("Ke off its diagonal", coupling(body.Ke), orthogonal));
+    const std::vector<int> list = elastic(body);
+    checks.push_back(vanishing("Ke off its diagonal", coupling(body.Ke(list, list)), orthogonal));
   }
   return checks;
 }
