@@ -17,6 +17,9 @@ int mesh_command(const MeshArguments& a, const CommonOptions& common) {
     model.notes.push_back(
         fmt::format("the file does not say that \"{0}\" is held; its modes take --clamp {0}", model.clamped));
   const Mesh& mesh = model.mesh;
+  if (a.file.extension() == ".msh" && !mesh.beam_properties.empty())
+    model.notes.emplace_back(
+        "a .msh file holds no sections of beams, so its beams cannot be read again; .inp and .vtu do");
   if (common.json) {
     ordered_json sets;
     for (const auto& [name, nodes] : mesh.node_sets) sets["node_sets"][name] = nodes.size();

@@ -45,6 +45,9 @@ void read_boundary(Deck& deck, const Keyword& keyword) {
   deck.lines.allow(keyword, {"OP", "TYPE", "AMPLITUDE", "FIXED", "LOADCASE", "TIMEDELAY"});
   const std::string type = upper_key(keyword.find("TYPE").value_or("DISPLACEMENT"));
   if (type != "DISPLACEMENT") deck.fail(keyword.at, "*BOUNDARY is understood with TYPE=DISPLACEMENT only");
+  if (keyword.find("LOADCASE").value_or("1") != "1")
+    deck.fail(keyword.at,
+              "*BOUNDARY, LOAD CASE=2 is of buckling modes and steady states, not of frequencies; leave it out");
   if (upper_key(keyword.find("OP").value_or("MOD")) == "NEW" && deck.in_step && !deck.cleared) {
     deck.boundaries.clear();
     deck.cleared = true;

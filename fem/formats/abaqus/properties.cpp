@@ -213,6 +213,9 @@ void read_beam_general_section(Deck& deck, const Keyword& keyword) {
   if (deck.real_or_zero(fields, 2, "I12") != 0) deck.fail(fields[2], "I12 must be zero: give principal directions");
   general.Iz = positive(3, "I22");
   general.J = positive(4, "J");
+  for (const size_t i : {5U, 6U})
+    if (deck.real_or_zero(fields, i, "sectorial moment or warping constant") != 0)
+      deck.notes.add("*BEAM GENERAL SECTION: the sectorial moment and the warping constant are left out");
   section.beam.start = section.beam.end = general;
   section.beam.y_axis = direction_1(deck);
   const Fields& moduli = need_data(deck, keyword, "E and G (after the line of direction 1)");

@@ -35,6 +35,7 @@ struct SolidLine {
 };
 
 struct BeamLine {
+  bool is_bar;  // CBAR, else CBEAM
   long label, property;
   std::array<long, 2> nodes;
   Eigen::Vector3d direction;  // y axis
@@ -48,6 +49,7 @@ struct SolidPropertyLine {
 };
 
 struct BeamPropertyLine {
+  bool is_of_bars;  // PBAR and PBARL, else PBEAM and PBEAML
   long material;
   SectionShape shape;
   bool shear;        // false: rigid in shear

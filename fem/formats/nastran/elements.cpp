@@ -114,6 +114,7 @@ void read_solid(Bulk& bulk, const Card& card) {
 
 void read_beam(Bulk& bulk, const Card& card) {
   BeamLine line;
+  line.is_bar = card.name == "CBAR";
   line.label = bulk.cards.id(card, 0, "element id");
   line.property = bulk.cards.id_or(card, 1, line.label, "property id");
   line.nodes = {bulk.cards.id(card, 2, "GA"), bulk.cards.id(card, 3, "GB")};

@@ -175,6 +175,11 @@ void Elements::add(const BeamLine& line) {
   const auto lines = bulk_.beam_properties.find(line.property);
   if (lines == bulk_.beam_properties.end())
     bulk_.fail(line.at, fmt::format("element {}: PBAR or PBEAM {} is not defined", line.label, line.property));
+  if (line.is_bar != lines->second.is_of_bars)
+    bulk_.fail(line.at, line.is_bar ? fmt::format("CBAR {}: property {} is a PBEAM; a CBAR has PBAR or PBARL",
+                                                  line.label, line.property)
+                                    : fmt::format("CBEAM {}: property {} is a PBAR; a CBEAM has PBEAM or PBEAML",
+                                                  line.label, line.property));
   const int a = node_of(bulk_, line.nodes[0], line.at), b = node_of(bulk_, line.nodes[1], line.at);
   Vector3d y = line.direction;
   if (line.direction_node != 0) y = mesh_.nodes.col(node_of(bulk_, line.direction_node, line.at)) - mesh_.nodes.col(a);

@@ -107,7 +107,7 @@ void read_psolid(Bulk& bulk, const Card& card) {
 }
 
 void read_pbar(Bulk& bulk, const Card& card) {
-  BeamPropertyLine line{bulk.cards.id(card, 1, "material id"), {}, false, 0, card.at};
+  BeamPropertyLine line{true, bulk.cards.id(card, 1, "material id"), {}, false, 0, card.at};
   GeneralSection section = constants(bulk, card);
   section.J = positive(bulk, card, 5, "J");
   line.line_mass = bulk.cards.real_or(card, 6, 0, "NSM");
@@ -118,7 +118,7 @@ void read_pbar(Bulk& bulk, const Card& card) {
 }
 
 void read_pbarl(Bulk& bulk, const Card& card) {
-  BeamPropertyLine line{bulk.cards.id(card, 1, "material id"), {}, true, 0, card.at};
+  BeamPropertyLine line{card.name == "PBARL", bulk.cards.id(card, 1, "material id"), {}, true, 0, card.at};
   size_t dimensions = 0;
   line.shape = shape_of(bulk, card, upper_key(card.field(3)), dimensions);
   try {
@@ -136,7 +136,7 @@ void read_pbarl(Bulk& bulk, const Card& card) {
 }
 
 void read_pbeam(Bulk& bulk, const Card& card) {
-  BeamPropertyLine line{bulk.cards.id(card, 1, "material id"), {}, false, 0, card.at};
+  BeamPropertyLine line{false, bulk.cards.id(card, 1, "material id"), {}, false, 0, card.at};
   GeneralSection section = constants(bulk, card);
   refuse_unless_zero(bulk, card, 5, "I12");
   section.J = positive(bulk, card, 6, "J");
