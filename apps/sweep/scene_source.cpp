@@ -231,7 +231,9 @@ SceneSource::SceneSource(const std::string& path_or_name) {
 
 void SceneSource::set(const std::string& path, const KeyVariant& variant) {
   size_t count = 0;
-  PathWalk(path, made_there, [&](Value& value, const std::string&) {
+  PathWalk(path, made_there, [&](Value& value, const std::string& place) {
+    if (place.starts_with("bodies[") && place.ends_with("].file") && !variant.word.ends_with(".h5"))
+      refuse_path(path, fmt::format("{} is no .h5 file; of a body file its keys can be varied", text_of(variant)));
     put_variant(value, variant);
     ++count;
   }).walk(root_);

@@ -67,7 +67,8 @@ class Keys(Case):
     def test_faults_of_a_path(self):
         for vary, word in (("hinges[7].P2=1", "4 entries"), ("hinges[x].P2=1", "[*]"), ("hub..mass=1", "empty"),
                            ("hub.mass.x=1", "no table"), ("hinges.sip.start_rate*=1,2", "no number"),
-                           ("hub.mass=-1,-2", "must be positive")):
+                           ("hub.mass=-1,-2", "must be positive"),
+                           ("bodies.sip.file=other.toml", "its keys can be varied")):
             self.refused("--vary", vary, "-n", "2", "--sample", "random", words=(word,))
 
     def test_no_key_is_varied_twice(self):
