@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <lapacke.h>
 
+#include <utility>
+
 namespace flexboom {
 
 using Eigen::MatrixXd;
@@ -65,6 +67,21 @@ RealEigenvectors eigenvectors(MatrixXd A) {
   if (info != 0 || !result.vectors.allFinite())
     throw NumericalError(fmt::format("eigenvectors: LAPACK failed ({}) on a matrix of {} rows", info, n));
   return result;
+}
+
+SymmetricPairs symmetric_pairs(MatrixXd A, MatrixXd B) {
+  require(A.rows() == A.cols() && B.rows() == A.rows() && B.cols() == A.rows(),
+          fmt::format("symmetric pairs: the matrices are {} x {} and {} x {}", A.rows(), A.cols(), B.rows(), B.cols()));
+  const auto n = static_cast<int>(A.rows());
+  Eigen::VectorXd nu(n);
+  if (n == 0) return {nu, A};
+  const OneBlasThread alone;  // the same digits for any number of threads
+  constexpr int problem = 1;  // A x = nu B x
+  const int info = LAPACKE_dsygvd(LAPACK_COL_MAJOR, problem, 'V', 'L', n, A.data(), n, B.data(), n, nu.data());
+  if (info > n) throw NumericalError(fmt::format("symmetric pairs: B is not positive definite (row {})", info - n));
+  if (info != 0 || !A.allFinite())
+    throw NumericalError(fmt::format("symmetric pairs: LAPACK failed ({}) on matrices of {} rows", info, n));
+  return {std::move(nu), std::move(A)};
 }
 
 MatrixXd inverse(MatrixXd A) {

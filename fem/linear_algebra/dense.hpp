@@ -31,6 +31,16 @@ struct RealEigenvectors {
 /// By LAPACK. @throws InputError for a matrix that is not square, NumericalError when it does not converge.
 RealEigenvectors eigenvectors(Eigen::MatrixXd A);
 
+/// All x and nu of A x = nu B x, nu ascending, x^T B x = 1. A is symmetric, B positive definite.
+struct SymmetricPairs {
+  Eigen::VectorXd nu;
+  Eigen::MatrixXd x;
+};
+
+/// By LAPACK (divide and conquer), from the lower triangles. @throws InputError for matrices that are not square or not
+/// of one size, NumericalError where B is not positive definite or the algorithm does not converge.
+SymmetricPairs symmetric_pairs(Eigen::MatrixXd A, Eigen::MatrixXd B);
+
 /// By LAPACK. @throws InputError for a matrix that is not square, NumericalError when a pivot is zero.
 Eigen::MatrixXd inverse(Eigen::MatrixXd A);
 

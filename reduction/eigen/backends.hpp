@@ -18,7 +18,7 @@ EigenPairs block_modes(const EigenProblem&, const SparseFactor& shifted, const E
 /// Implicitly restarted Lanczos of Spectra, shift-invert. Wants 1 <= count < unknowns.
 EigenPairs spectra_modes(const EigenProblem&, const SparseFactor& shifted, const EigenRequest&);
 
-/// Everything by Eigen's dense QR algorithm: the oracle, and the way for problems that are too small for Lanczos.
+/// Everything by LAPACK's divide and conquer: the oracle, and the way for problems that are too small for Lanczos.
 /// Needs sigma below the lowest eigenvalue; works with a singular M.
 EigenPairs dense_modes(const EigenProblem&, const SparseFactor& shifted, const EigenRequest&);
 
