@@ -6,6 +6,7 @@
 #include "apps/model/static_shapes.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/text_reader.hpp"
+#include "reduction/basis/mode_selection.hpp"
 
 #include <fmt/format.h>
 
@@ -38,6 +39,27 @@ std::vector<std::string> static_shapes_of_markers(const Model& model, const Redu
   return places.size() > few ? std::vector<std::string>{} : static_shapes_at(places);
 }
 
+/// Interfaces hold the static shapes of their loads, and of what stretches a body between them no more. `richer`: with
+/// more modes, here with those that stretch and twist it. Empty where there are none among many.
+std::optional<ReducedBody> with_stretching(const Model& model, ReductionOptions o, const ReducedBody& richer,
+                                           const ReducedBody& kept, int threads) {
+  const auto attachments = std::ranges::count(richer.coordinates, "attachment", &Coordinate::kind);
+  const int first = richer.n() - static_cast<int>(attachments), given = o.basis.modes;
+  try {
+    for (const int beside : modes_searched) {
+      o.basis.modes = given + beside;
+      const ReducedBody all = for_comparison(model, o, threads);
+      std::vector<int> list = first_and_stretching(all, first, kept);
+      if (list.empty()) continue;
+      for (int& k : list) --k;
+      for (int k = all.n() - static_cast<int>(attachments); k < all.n(); ++k) list.push_back(k);
+      return selected(all, list);
+    }
+  } catch (const std::runtime_error&) {  // it has not so many
+  }
+  return {};
+}
+
 /// With as many more modes as the elements have, eight at most. Where the hinge lets them be told apart, modes of all
 /// directions stand beside those of a plane.
 std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions o, const ReducedBody& kept,
@@ -50,8 +72,9 @@ std::optional<ReducedBody> with_more_modes(const Model& model, ReductionOptions 
       o.basis.modes = given + (o.basis.name == "hinge" ? more / 2 : more);
       try {
         ReducedBody body = for_comparison(model, o, threads);
-        if (body.n() > kept.n()) return body;
-        return {};
+        if (body.n() <= kept.n()) return {};
+        if (o.basis.name == "craig-bampton") return with_stretching(model, o, body, kept, threads);
+        return body;
       } catch (const std::runtime_error&) {  // it has not so many
       }
     }
@@ -76,7 +99,8 @@ RicherBodies richer_bodies(const Model& model, const ReductionOptions& options, 
   ReductionOptions o = options;
   o.certified = false;
   r.more_modes = with_more_modes(model, o, kept, threads);
-  if (!r.more_modes) notes.emplace_back("no more modes are kept for error estimates: the elements have no more");
+  if (!r.more_modes)
+    notes.emplace_back("no more modes are kept for error estimates: the elements have no more that show it");
   if (errors != "all") return r;
   try {
     if (const std::optional<Model> finer = refined_if_bearable(model, 1)) {

@@ -22,6 +22,22 @@ std::vector<std::string> static_shapes_beside(const ReducedBody& body, const std
   return shapes;
 }
 
+std::vector<int> first_and_stretching(const ReducedBody& body, int first, const ReducedBody& kept) {
+  constexpr int few = 2;  // beyond those of the model: the next alone may happen to do little
+  std::vector<int> list;
+  for (int k = 1; k <= first; ++k) list.push_back(k);
+  for (const char* kind : {"axial", "torsion"}) {
+    const auto is_of_kind = [kind](const Coordinate& c) { return c.kind == kind; };
+    const auto own = std::ranges::count_if(kept.coordinates, is_of_kind);
+    auto count = std::count_if(body.coordinates.begin(), body.coordinates.begin() + first, is_of_kind);
+    for (int k = first; k < body.n() && count < own + few; ++k)
+      if (is_of_kind(body.coordinates[static_cast<size_t>(k)])) list.push_back(k + 1), ++count;
+    if (count <= own) return {};
+  }
+  std::ranges::sort(list);
+  return list;
+}
+
 std::vector<std::string> static_shapes_at(const std::string& node_set) {
   std::vector<std::string> shapes;
   for (const char* direction : {"Fx", "Fy", "Fz", "Mx", "My", "Mz"}) shapes.push_back(node_set + "." + direction);
@@ -35,14 +51,13 @@ std::vector<std::string> static_shapes_at(const std::vector<std::string>& node_s
   return shapes;
 }
 
-namespace {
-
-/// Has a place coordinates of its own, which hold the static shapes of its loads?
 bool is_interface(const BodyScene& body, const std::string& marker) {
   return body.basis.name == "craig-bampton" && std::ranges::any_of(body.basis.interfaces, [&](const std::string& text) {
            return same_but_case(text.substr(0, text.find(':')), marker);
          });
 }
+
+namespace {
 
 /// Where joints, springs and loads of a scene act on a body, by its markers.
 std::vector<std::string> loaded_markers(const Scene& scene, const std::string& body) {

@@ -144,10 +144,9 @@ BodyScene with_modes(BodyScene b, int wanted, const std::filesystem::path& keep,
 
 namespace {
 
-/// A boom with more modes, up to the frequency `reach` at least, if there are so many.
-BodyScene with_more_modes(const BodyScene& b, const ModesBeyond& more, double reach, const std::filesystem::path& keep,
-                          const RunHooks& hooks) {
-  if (b.basis.name == "clamped") return with_more_of_each_kind(b, more, reach, keep, hooks);
+/// The first modes of a basis that is whole, in all directions: up to the frequency `reach`, if there are so many.
+BodyScene with_more_of_whole(const BodyScene& b, const ModesBeyond& more, double reach,
+                             const std::filesystem::path& keep, const RunHooks& hooks) {
   const int per_plane = b.directions == "all" ? (b.modes + 1) / 2 : b.modes;
   BodyScene richer = b;
   richer.directions = "all";
@@ -159,6 +158,37 @@ BodyScene with_more_modes(const BodyScene& b, const ModesBeyond& more, double re
     const bool is_last = richer.modes < 2 * (per_plane + beside) || 2 * beside >= most_for_tones;
     if (is_last || std::ranges::max(frequencies(prepared(richer, 0, keep, hooks))) >= reach) return richer;
   }
+}
+
+/// That body with modes that stretch and twist it, which come late. Where there are none among many, static shapes of
+/// loads at the free end stand for them. @throws InputError where these are coordinates of the basis itself, whose
+/// error they do not show.
+BodyScene with_stretching(const BodyScene& richer, const BodyScene& b, const std::filesystem::path& keep,
+                          const RunHooks& hooks) {
+  if (b.structure != "beam" && b.structure != "solid") return richer;
+  const PreparedBody kept = prepared(b, 0, keep, hooks), base = prepared(richer, 0, keep, hooks);
+  const bool is_nested = b.basis.name != "hinge";  // coordinates of fewer modes are among those of more
+  for (const int beside : modes_searched) {
+    const BodyScene longer = with_modes(richer, richer.modes + beside, keep, hooks);
+    if (!is_nested || longer.modes < richer.modes + beside) break;
+    BodyScene found = longer;
+    found.shapes = first_and_stretching(prepared(longer, 0, keep, hooks).body, base.coordinates_of_modes(), kept.body);
+    if (!found.shapes.empty()) return found;
+  }
+  const std::vector<std::string> statics = static_shapes_beside(base.body, b.clamp);
+  for (const std::string& shape : statics)
+    if (is_interface(b, shape.substr(0, shape.rfind('.'))))
+      throw InputError(
+          fmt::format("body {} of basis \"{}\" has no more modes that stretch or twist it among {} beyond its own",
+                      b.name, b.basis.name, richer.modes - b.modes + modes_searched.back()));
+  return with_static_shapes(richer, statics);
+}
+
+/// A boom with more modes, up to the frequency `reach` at least, if there are so many.
+BodyScene with_more_modes(const BodyScene& b, const ModesBeyond& more, double reach, const std::filesystem::path& keep,
+                          const RunHooks& hooks) {
+  if (b.basis.name == "clamped") return with_more_of_each_kind(b, more, reach, keep, hooks);
+  return with_stretching(with_more_of_whole(b, more, reach, keep, hooks), b, keep, hooks);
 }
 
 }  // namespace

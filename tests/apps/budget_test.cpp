@@ -118,6 +118,48 @@ TEST_P(Budget, CountsTheStretchOfASlenderBar) {
 }
 
 // Weight along a bar that may only bend in the hinge plane: what would help is said.
+// A slider moves a boom along its own axis. Modes that stretch it come after many that bend it.
+TEST(BudgetOfATree, CountsTheStretchOfWholeBases) {
+  const std::string text = R"toml(format = "flexboom-scene-1"
+name = "x"
+duration = 0.3
+output_step = 0.005
+[accuracy]
+tolerance = 0.02
+outputs = ["j.force"]
+[[bodies]]
+name = "boom"
+directions = "all"
+stiffening = "on"
+basis = "craig-bampton"
+modes = 6
+[[bodies.segments]]
+shape = "round-bar"
+diameter = 0.02
+length = 1.0
+material = { E = 700000000.0, nu = 0.3, rho = 1500 }
+[[joints]]
+name = "j"
+kind = "slider"
+loads = true
+motion = { profile = "trapezoid", angle = 0.05, peak_rate = 0.2, peak_acceleration = 2.0, start = 0.1 }
+b = { body = "boom", marker = "root", x = [0, 0, 1.0], z = [1.0, 0, 0] }
+)toml";
+  Scene fine = parse_scene(with(text, "craig-bampton", "clamped"), "slide.toml");
+  fine.bodies[0].modes = 48;
+  fine.bodies[0].geometry.order = 8;
+  fine.error_budget = false;
+  const RunResult exact = run_scene(fine, {});
+  for (const char* basis : {"craig-bampton", "mean-axis", "prestressed"}) {
+    const RunResult coarse = run_scene(parse_scene(with(text, "craig-bampton", basis), "slide.toml"), {});
+    const double error = largest(compare_outputs(coarse.outputs, exact.outputs, fine.outputs));
+    EXPECT_GT(error, 0.4) << basis;
+    EXPECT_GT(coarse.budget.truncation, error) << basis;
+    EXPECT_LT(coarse.budget.truncation, 3 * error) << basis;
+    EXPECT_FALSE(coarse.budget.within(fine.tolerance)) << basis;
+  }
+}
+
 TEST(BudgetOfATree, NamesTheDirectionsThatAreLeftOut) {
   Scene scene = held_bar("fixed", 9.81, 0, 0.02, 10, 6);
   const auto is_helped = [](const RunResult& r) {

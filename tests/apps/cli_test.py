@@ -1635,6 +1635,41 @@ start = 0.3
         errors = json.loads(flexboom("inspect", body, "--json").stdout)["errors"]
         self.assertEqual(errors["more_modes"], 4 + 8 + 3 * 6)  # root, middle and tip move
 
+    def test_the_file_tells_the_errors_between_its_interfaces(self):
+        """A slider moves a boom along its axis; without modes that stretch it its force is wrong by all of it."""
+        rod, body, scene = (self.folder / name for name in ("rod.toml", "rod.h5", "slide.toml"))
+        rod.write_text("""format = "flexboom-body-1"
+name = "boom"
+directions = "all"
+[[segments]]
+shape = "round-bar"
+diameter = 0.02
+length = 1.0
+material = { E = 0.7e9, nu = 0.3, rho = 1500 }
+""")
+        scene.write_text(f"""format = "flexboom-scene-1"
+name = "slide"
+duration = 0.3
+output_step = 0.005
+[accuracy]
+tolerance = 0.02
+outputs = ["j.force"]
+[[bodies]]
+name = "boom"
+file = "{body}"
+[[joints]]
+name = "j"
+kind = "slider"
+loads = true
+motion = {{ profile = "trapezoid", angle = 0.05, peak_rate = 0.2, peak_acceleration = 2.0, start = 0.1 }}
+b = {{ body = "boom", marker = "root", x = [0, 0, 1], z = [1, 0, 0] }}
+""")
+        self.assert_exit(OK, flexboom("reduce", rod, "-o", body, "--quiet", "--basis", "craig-bampton", "--interface", "root",
+                                      "--interface", "tip", "--reference", "root", "--count", "6"))
+        result = flexboom("run", scene, "--json", "--out", self.folder / "results")
+        self.assert_exit(OK, result)
+        self.assertGreater(json.loads(result.stdout)["error_budget"]["truncation"], 0.5)
+
     def test_every_export_is_read_back(self):
         clamped = self.reduce("--count", "4", "--damping", "modal:0.01")[0].rename(self.folder / "clamped.h5")
         free = self.reduce("--basis", "craig-bampton", "--interface", "root", "--interface", "tip", "--count", "4")[0]
