@@ -27,6 +27,7 @@ Model body_model(const std::filesystem::path& path, const ModelOptions& options)
   if (options.order) (solid ? body.solid.order : body.geometry.order) = *options.order;
   if (options.element) body.solid.element = *options.element;
   if (options.accuracy) body.solid.accuracy = *options.accuracy;
+  if (options.clamp) body.clamp = *options.clamp;
   if (options.material) {
     for (BeamSegment& s : body.geometry.segments) s.material = parse_material(*options.material);
   }
@@ -40,7 +41,7 @@ Model body_model(const std::filesystem::path& path, const ModelOptions& options)
   if (body.structure == "eq14")
     model.notes.emplace_back(
         "modes solves finite elements; the closed form of structure = \"eq14\" is in `flexboom compare`");
-  if (!options.free) model.clamped = options.clamp.value_or(body.clamp);
+  if (!options.free) model.clamped = body.clamp;
   model.body = std::move(body);
   hold(model);
   return model;

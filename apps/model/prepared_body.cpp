@@ -6,6 +6,7 @@
 #include "apps/model/picture.hpp"
 #include "apps/model/reduction.hpp"
 #include "fem/base/check.hpp"
+#include "fem/base/text_reader.hpp"
 #include "fem/booms/solid_boom.hpp"
 #include "reduction/basis/mode_selection.hpp"
 #include "reduction/body_file/body_file.hpp"
@@ -77,8 +78,10 @@ PreparedBody prepare_eq14(const BodyScene& b) {
 }
 
 Mesh solid_mesh(const BodyScene& b, int refine) {
-  if (refine == 0) return make_solid_mesh(b.geometry, b.solid);
-  const std::optional<SolidOptions> options = refined(chosen(b.geometry, b.solid), refine);
+  SolidOptions own = b.solid;
+  own.holds_tip = same_but_case(b.clamp, "tip");
+  if (refine == 0) return make_solid_mesh(b.geometry, own);
+  const std::optional<SolidOptions> options = refined(chosen(b.geometry, own), refine);
   require(options.has_value(), fmt::format("body {}: there is no coarser mesh of its elements", b.name));
   return make_solid_mesh(b.geometry, *options);
 }

@@ -31,7 +31,9 @@ double start_of(const BeamGeometry& boom, int segment) {
   return x;
 }
 
-bool holds_body_at_tip(const BeamGeometry& boom) {
+/// Is the face of the tip rigid, or held?
+bool is_tip_stiff(const BeamGeometry& boom, const SolidOptions& options) {
+  if (options.holds_tip) return true;
   const double length = boom.length();
   return std::any_of(boom.attachments.begin(), boom.attachments.end(),
                      [&](const RigidAttachment& a) { return a.position >= length * (1 - same_station); });
@@ -155,7 +157,7 @@ void place_planes(const BeamGeometry& boom, BoomPlan& plan) {
   const double long_size = boom.length() / grading.long_elements;
   for (size_t r = 0; r < plan.runs.size(); ++r) {
     const BoomRun& run = plan.runs[r];
-    const bool last_graded = r + 1 < plan.runs.size() || holds_body_at_tip(boom);
+    const bool last_graded = r + 1 < plan.runs.size() || is_tip_stiff(boom, plan.options);
     for (int i = run.first; i <= run.last; ++i) {
       const BeamSegment& segment = boom.segments[static_cast<size_t>(i)];
       const double start = start_of(boom, i);
@@ -175,14 +177,14 @@ void place_planes(const BeamGeometry& boom, BoomPlan& plan) {
   for (size_t l = 1; l < plan.layers.size(); ++l) plan.layers[l].from = plan.layers[l - 1].to;
 }
 
-// ---- what is singular: rims of the root, of a tip that holds a body, and re-entrant rims of steps
+// ---- what is singular: rims of the root, of a tip that is held or holds a body, and re-entrant rims of steps
 
 void place_corners(const BeamGeometry& boom, BoomPlan& plan) {
   if (plan.options.grading.corner_levels == 0) return;
   const int rim = plan.layers.front().columns, end = static_cast<int>(plan.layers.size());
   plan.corners.push_back({rim, 0});
   if (!plan.core) plan.corners.push_back({0, 0});
-  if (holds_body_at_tip(boom)) {
+  if (is_tip_stiff(boom, plan.options)) {
     plan.corners.push_back({plan.layers.back().columns, end});
     if (!plan.core) plan.corners.push_back({0, end});
   }

@@ -30,6 +30,7 @@ struct SolidOptions {
   int order = 0;                // of "hex": 1 to 8, 0: chosen
   double slit = 0;              // width of a slit along every tube, at +y, measured on the midline [m]; 0: closed
   SolidGrading grading{};
+  bool holds_tip = false;  // the face of the tip is held, so that elements are small there as at the root
 };
 
 /// Order and sizes that make_solid_mesh takes, nothing left open.
