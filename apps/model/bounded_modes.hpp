@@ -44,13 +44,13 @@ bool tapers_steeply(const BeamGeometry&);
 /// most.
 double slowest_fall(const BodyScene&);
 
-/// Modes of a model, each frequency with a bound from a mesh of the same boom that is one step finer (`refined`).
+/// Modes of a model, each frequency with a bound from a mesh of the same boom that is finer (`refined`).
 ///
 /// From one mesh to the next, errors are assumed to fall by a factor f or more (`slowest_fall`). The change of a
 /// frequency is then at least 1 - f of the coarser mesh's error, and at least (1 - f) / f of the finer one's. A bound
-/// of a solid is never less than a fiftieth of the largest. Beams are compared three steps finer, where they have so
-/// high an order. Where the change is a tenth of the frequency or more, the
-/// coarser mesh resolves neither this mode nor those above it, whose order may change.
+/// of a solid is never less than a fiftieth of the largest. Beams are compared three steps finer, as far as their order
+/// goes: errors fall by f^3. Where the change is a tenth of the frequency or more, the coarser mesh resolves neither
+/// this mode nor those above it, whose order may change.
 ///
 /// What the round-off of K changes (ModalBasis::round_off) is part of a bound. Where that alone is a tenth or more,
 /// neither this mode nor those above it have one.
