@@ -48,7 +48,7 @@ std::optional<ReducedBody> with_stretching(const Model& model, ReductionOptions 
   try {
     for (const int beside : modes_searched) {
       o.basis.modes = given + beside;
-      const ReducedBody all = for_comparison(model, o, threads);
+      const ReducedBody all = beside == 0 ? richer : for_comparison(model, o, threads);
       std::vector<int> list = first_and_stretching(all, first, kept);
       if (list.empty()) continue;
       for (int& k : list) --k;

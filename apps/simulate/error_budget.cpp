@@ -139,8 +139,8 @@ using Part = double OutputErrors::*;
 
 /// Rates of joints that do not float converge as 1 / n where a torque is there at once. It turns the root of a body as
 /// fast as that part of it turns which has felt it: more modes, a smaller part.
-bool is_rate_of_joint(const std::string& output, const Scene& scene) {
-  return std::ranges::any_of(with_joints(scene).joints, [&output](const JointScene& joint) {
+bool is_rate_of_joint(const std::string& output, const std::vector<JointScene>& joints) {
+  return std::ranges::any_of(joints, [&output](const JointScene& joint) {
     return !joint_type(joint.kind).floats && output.starts_with(joint.name + ".rate");
   });
 }
@@ -392,11 +392,12 @@ ErrorBudget budget_by_repeats(Scene& scene, Run& run, const RunHooks& hooks, std
   Measuring m{{hooks, floors_of(scene, run.bodies)}, plan};
   ErrorBudget& budget = m.budget;
   Scene flown = as_flown(scene, run);
+  const std::vector<JointScene> joints = with_joints(scene).joints;
   for (const OutputDifference& d : compare_outputs(run.outputs, run.outputs, scene.outputs, m.repeats.floors)) {
     budget.outputs.push_back({});
     OutputErrors& o = budget.outputs.back();
     o.name = d.name, o.scale = d.scale, o.size = d.size;
-    if (is_rate_of_joint(o.name, scene)) m.slow.insert(o.name);
+    if (is_rate_of_joint(o.name, joints)) m.slow.insert(o.name);
   }
   const auto measured = [&m, &hooks](std::string_view part, const auto& repeat) {
     if (hooks.stopped()) return unknown;

@@ -84,8 +84,7 @@ Scene Planner::with_candidates(const Scene& scene, int candidates, int made, con
     if (b.basis.name == "clamped") modes = made / share + (scene.error_budget ? for_budget : 0);
     b = with_modes(b, modes, scene.bodies_kept_in, hooks);
     b = with_static_shapes(b, moving_static_shapes(scene, b));
-    const bool is_whole = b.basis.name != "clamped";
-    const auto shown = candidates < made || is_whole ? shown_.end() : shown_.find(b.name);
+    const auto shown = candidates < made || !has_choice(scene, b.name) ? shown_.end() : shown_.find(b.name);
     if (shown != shown_.end()) b.modes = std::max(b.modes, shown->second.modes);
     if (b.modes <= wanted) continue;
     b.shapes.resize(static_cast<size_t>(wanted));
