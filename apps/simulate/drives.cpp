@@ -50,17 +50,6 @@ bool is_resolved(const Reals& v, const std::function<double(double)>& f, double 
 
 using Sums = std::vector<std::complex<double>>;
 
-/// The sums of value_i exp(-i w t_i), t at equal steps, for w from 0 by pi / duration.
-Sums transform(const Reals& values) {
-  Eigen::FFT<double> fft;
-  fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
-  Reals padded(values);
-  padded.resize(2 * std::bit_floor(values.size()), 0.0);
-  Sums sums;
-  fft.fwd(sums, padded);
-  return sums;
-}
-
 Reals sizes(const Sums& sums, double scale) {
   Reals r(sums.size());
   std::ranges::transform(sums, r.begin(), [scale](std::complex<double> z) { return scale * std::abs(z); });
@@ -107,6 +96,16 @@ std::vector<Drive> drives_of(const Scene& scene) {
     for (size_t i = 0; i < 3; ++i) add(l.force[i], false), add(l.torque[i], false);
   for (const WheelScene& w : scene.wheels) add(w.torque, false);
   return drives;
+}
+
+std::vector<std::complex<double>> spectral_sums(const std::vector<double>& values) {
+  Eigen::FFT<double> fft;
+  fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
+  Reals padded(values);
+  padded.resize(2 * std::bit_floor(values.size()), 0.0);
+  Sums sums;
+  fft.fwd(sums, padded);
+  return sums;
 }
 
 std::vector<double> corners_of(const Drive& drive, double duration, int samples) {
@@ -170,10 +169,10 @@ DriveSpectra::Spectrum DriveSpectra::spectrum_of(const Drive& drive, double dura
   Reals changes(f.size());
   changes[0] = f[0];
   for (size_t i = 1; i < f.size(); ++i) changes[i] = f[i] - f[i - 1];
-  const Sums sums = transform(changes);
+  const Sums sums = spectral_sums(changes);
   s.strength = sizes(sums, 1 / size);
   s.repeated = sizes(windowed(sums), 1 / size);
-  s.content = sizes(transform(f), 2 / (steps * size));
+  s.content = sizes(spectral_sums(f), 2 / (steps * size));
   for (size_t i = 1; i < s.repeated.size(); ++i) s.repeated[i] /= static_cast<double>(i);
   return s;
 }

@@ -3,6 +3,7 @@
 #include "apps/scene/scene.hpp"
 #include "dynamics/model/time_function.hpp"
 
+#include <complex>
 #include <functional>
 #include <vector>
 
@@ -31,6 +32,12 @@ std::vector<double> corners_of(const Drive&, double duration, int samples);
 
 /// How many times drives are looked at before a flight: at each output and between, and in each row of a table.
 int samples_of(const Scene&, const std::vector<Drive>&);
+
+/// A mode feels a tone so many times its frequency away, at most, for what holds a body shifts its frequencies.
+inline constexpr double beyond_a_tone = 1.3;
+
+/// The sums of value_i exp(-i w t_i), t at equal steps, for w from 0 by pi over a duration of 2^n steps.
+std::vector<std::complex<double>> spectral_sums(const std::vector<double>& values);
 
 /// How strongly the drives of a scene move vibrations of each frequency.
 ///

@@ -203,21 +203,43 @@ std::vector<OutputDifference> Repeats::change(
 struct Beyond {
   Scene scene;
   bool has_few_digits = false;
+  std::optional<Scene> kept{};  // the run with the elements of that scene, where it has finer ones
 };
 
+/// Where tones make modes go on, elements are finer.
+std::optional<Scene> with_elements_of(const Scene& richer, const ErrorBudget& budget, Scene flown) {
+  bool any = false;
+  for (size_t i = 0; i < flown.bodies.size(); ++i) {
+    BodyScene& b = flown.bodies[i];
+    if (b.structure != "beam" || !budget.reach.contains(b.name)) continue;
+    b.geometry = richer.bodies[i].geometry;
+    any = true;
+  }
+  return any ? std::optional(std::move(flown)) : std::nullopt;
+}
+
+/// Loads converge slowly.
+ModesBeyond number_beyond(const ErrorBudget& budget) {
+  return {.as_many = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name)};
+}
+
 /// Nothing where no body is elastic. The modes are flown with few digits first: more only where the answer would drown
-/// in the error of time integration. @throws InputError where the scene has no more modes.
-std::optional<Beyond> modes_beyond(const Scene& scene, const Scene& flown, const StillKinds& still,
-                                   const ErrorBudget& budget, const RunHooks& hooks) {
+/// in the error of time integration. Those among `shaken` are taken in whose effect is more than the least.
+/// @throws InputError where the scene has no more modes.
+std::optional<Beyond> modes_beyond(const Scene& scene, const Scene& flown, const StillKinds& still, ErrorBudget& budget,
+                                   const RunHooks& hooks, const ShakenModes& shaken = {}, double least = 0) {
   require_richer(scene, &RicherBodies::more_modes, "more modes");
   require_static_shapes(scene);
   if (!any_elastic(scene)) return {};
   if (scene.from) throw InputError("a saved state knows nothing of modes beyond its own");
-  const bool loads = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name);
   const DriveSpectra drives(flown);
-  Scene more = with_more_modes(flown, {.as_many = loads}, drives, hooks);
+  const ModesBeyond beyond = number_beyond(budget);
+  budget.reach = with_shaken(reach_of_drives(flown, beyond, drives, hooks), shaken, least);
+  Scene more = with_more_modes(flown, beyond, budget.reach, hooks);
   require_drives_shown(more, drives, hooks);
+  require_reached(more, budget.reach, hooks);
   Beyond r{without_kinds(std::move(more), still, hooks)};
+  r.kept = with_elements_of(r.scene, budget, flown);
   constexpr double few_digits = 1e-5;
   r.has_few_digits = flown.tolerance < few_digits;
   if (r.has_few_digits) r.scene.tolerance = few_digits, r.scene.integrator_tolerance = 0;
@@ -244,15 +266,18 @@ Finding truncation_of(std::optional<Beyond> beyond, const Run& run, const Scene&
   const double time_error = m.budget.time;
   const auto borne = [&m](const std::vector<OutputDifference>& changes) { return m.are_borne(changes); };
   Scene& more = beyond->scene;
+  std::optional<Run> with_finer_elements;
+  if (beyond->kept) with_finer_elements = repeats.repeated(run, *beyond->kept);
+  const Run& kept = with_finer_elements ? *with_finer_elements : run;
   // A digit more may be wanted as well.
   if (!beyond->has_few_digits && repeats.may_be_of_time(repeats.floors.tolerance, time_error))
     fly_ahead(with_a_digit_more(more), repeats.hooks, 0, bearable_steps(run));
-  Finding r{repeats.change(run, more, beyond->has_few_digits ? unknown : time_error, 0, borne)};
+  Finding r{repeats.change(kept, more, beyond->has_few_digits ? unknown : time_error, 0, borne)};
   give_up_ahead(repeats.hooks);
   const double noise = time_error > flown.step_tolerance() ? time_error / flown.step_tolerance() : 1;
   if (beyond->has_few_digits && largest(r.differences) <= 10 * noise * more.tolerance) {
     more.tolerance = flown.tolerance, more.integrator_tolerance = flown.integrator_tolerance;
-    r.differences = repeats.change(run, more, time_error, 0, borne);
+    r.differences = repeats.change(kept, more, time_error, 0, borne);
   }
   for (OutputDifference& d : r.differences) d.error *= m.truncation_per_change(d.name);
   return r;
@@ -411,12 +436,13 @@ ErrorBudget budget_by_repeats(Scene& scene, Run& run, const RunHooks& hooks, std
   std::optional<Beyond> beyond;
   std::string beyond_what;
   bool has_beyond = true;
+  const auto still_now = [&] { return budget.has_stiffened ? StillKinds{} : still; };
   // The longest of the repeats: it is flown while others are, and anew where these change the run.
   const auto look_beyond = [&] {
     if (!has_beyond || std::exchange(beyond_what, to_toml(flown)) == beyond_what) return;
     give_up_ahead(hooks);
     const double found = measured("truncation", [&] {
-      beyond = modes_beyond(scene, flown, budget.has_stiffened ? StillKinds{} : still, budget, hooks);
+      beyond = modes_beyond(scene, flown, still_now(), budget, hooks);
       if (!beyond) return 0.0;
       m.slow_per_change = std::max(2.0, modes_by_modes_beyond(flown, beyond->scene));
       fly_ahead(beyond->scene, hooks, 0, bearable_steps(run));
@@ -440,7 +466,18 @@ ErrorBudget budget_by_repeats(Scene& scene, Run& run, const RunHooks& hooks, std
   });
   if (has_beyond)
     budget.truncation = measured("truncation", [&] {
-      return m.enter(&OutputErrors::truncation, truncation_of(std::move(beyond), run, flown, m));
+      constexpr double of_truncation = 1.0 / 3;
+      ShakenModes shaken;  // found while the modes beyond are flown
+      if (beyond)
+        shaken = shaken_modes(flown, number_beyond(budget), budget.reach, MotionSpectra(flown, run, hooks), hooks);
+      Finding found = truncation_of(beyond, run, flown, m);
+      const double least = std::max(counting_effect * scene.tolerance, of_truncation * largest(found.differences));
+      if (any_counts(shaken, least)) {
+        beyond = modes_beyond(scene, flown, still_now(), budget, hooks, shaken, least);
+        m.slow_per_change = std::max(2.0, modes_by_modes_beyond(flown, beyond->scene));
+        found = truncation_of(beyond, run, flown, m);
+      }
+      return m.enter(&OutputErrors::truncation, found);
     });
   budget.measured = !hooks.stopped();
   for (const std::string& line : budget.missing) plan.push_back("error budget: " + line);

@@ -25,9 +25,6 @@ std::vector<double> frequencies(const PreparedBody& p) {
   return w;
 }
 
-/// Modes to show what a tone does: so far beyond it, for what holds a body shifts its frequencies.
-constexpr double beyond_a_tone = 1.3;
-
 /// The frequencies of the modes of a body: the lowest, and up to which it has all [rad/s].
 struct Span {
   double lowest = 0, highest = 0;
@@ -193,15 +190,65 @@ BodyScene with_more_modes(const BodyScene& b, const ModesBeyond& more, double re
 
 }  // namespace
 
-Scene with_more_modes(Scene scene, const ModesBeyond& more, const DriveSpectra& drives, const RunHooks& hooks) {
+namespace {
+
+/// A body from a file has the modes beyond its own that are there.
+BodyScene with_modes_of_its_file(BodyScene b) {
+  if (!b.richer || !b.richer->more_modes) return b;
+  b.reduced = {b.richer, &*b.richer->more_modes};
+  b.richer = nullptr;  // of those modes there is nothing finer
+  return b;
+}
+
+bool is_elastic(const BodyScene& b) { return !b.rigid && b.structure != "rigid"; }
+
+}  // namespace
+
+Reach reach_of_drives(const Scene& scene, const ModesBeyond& more, const DriveSpectra& drives, const RunHooks& hooks) {
+  Reach reach;
+  if (drives.empty()) return reach;
+  for (const BodyScene& b : scene.bodies) {
+    if (!is_elastic(b) || !b.is_boom()) continue;
+    const BodyScene shown = with_more_modes(b, more, 0, scene.bodies_kept_in, hooks);
+    if (const double wanted = span_of(shown, scene.bodies_kept_in, hooks).wanted(drives); wanted > 0)
+      reach[b.name] = wanted;
+  }
+  return reach;
+}
+
+ShakenModes shaken_modes(const Scene& scene, const ModesBeyond& more, const Reach& reach, const MotionSpectra& motion,
+                         const RunHooks& hooks) {
+  ShakenModes shaken;
+  for (const BodyScene& b : scene.bodies) {
+    if (!is_elastic(b)) continue;
+    const auto richer = [&](double to) {
+      return b.is_boom() ? with_more_modes(b, more, to, scene.bodies_kept_in, hooks) : with_modes_of_its_file(b);
+    };
+    const auto of_drives = reach.find(b.name);
+    const BodyScene shown = richer(of_drives != reach.end() ? of_drives->second : 0);
+    const double highest = span_of(shown, scene.bodies_kept_in, hooks).highest, all = beyond_a_tone * motion.fastest();
+    if (!(highest > 0 && all > highest)) continue;
+    shaken[b.name] = motion.shaken_beyond(prepared(richer(all), 0, scene.bodies_kept_in, hooks).body, highest);
+  }
+  return shaken;
+}
+
+bool any_counts(const ShakenModes& shaken, double least) { return !with_shaken({}, shaken, least).empty(); }
+
+Reach with_shaken(Reach reach, const ShakenModes& shaken, double least) {
+  for (const auto& [body, modes] : shaken)
+    for (const ShakenMode& mode : modes)
+      if (mode.effect > least) reach[body] = std::max(reach[body], mode.frequency);
+  return reach;
+}
+
+Scene with_more_modes(Scene scene, const ModesBeyond& more, const Reach& reach_of_bodies, const RunHooks& hooks) {
   for (BodyScene& b : scene.bodies) {
-    if (b.richer && b.richer->more_modes) {
-      b.reduced = {b.richer, &*b.richer->more_modes};
-      b.richer = nullptr;  // of those modes there is nothing finer
-    }
+    b = with_modes_of_its_file(std::move(b));
     if (b.structure == "rigid" || !b.is_boom()) continue;
+    const auto wanted = reach_of_bodies.find(b.name);
+    const double reach = wanted != reach_of_bodies.end() ? wanted->second : 0;
     BodyScene richer = with_more_modes(b, more, 0, scene.bodies_kept_in, hooks);
-    const double reach = drives.empty() ? 0 : span_of(richer, scene.bodies_kept_in, hooks).wanted(drives);
     if (reach > 0) {
       if (b.structure == "beam") b.geometry = refined(b.geometry, 2);  // a resonance needs the right frequency
       richer = with_more_modes(b, more, reach, scene.bodies_kept_in, hooks);
@@ -223,6 +270,20 @@ void require_drives_shown(const Scene& scene, const DriveSpectra& drives, const 
           fmt::format("a function of time moves vibrations of body {} at up to {:.4g} rad/s, which takes modes up to "
                       "{:.4g} rad/s to show, and those that are tried end at {:.4g} rad/s",
                       b.name, tone, beyond_a_tone * tone, span.highest));
+  }
+}
+
+void require_reached(const Scene& scene, const Reach& reach, const RunHooks& hooks) {
+  constexpr double round_off = 1e-6;  // finer elements have lower frequencies
+  for (const BodyScene& b : scene.bodies) {
+    const auto wanted = reach.find(b.name);
+    if (wanted == reach.end()) continue;
+    const Span span = span_of(b, scene.bodies_kept_in, hooks);
+    if (wanted->second > (1 + round_off) * span.highest)
+      throw InputError(
+          fmt::format("the motion shakes vibrations of body {} that take modes up to {:.4g} rad/s to show, and those "
+                      "that are tried end at {:.4g} rad/s",
+                      b.name, wanted->second, span.highest));
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "apps/simulate/drives.hpp"
+#include "apps/simulate/motion_spectra.hpp"
 #include "apps/simulate/simulate.hpp"
 
 #include <algorithm>
@@ -28,14 +29,37 @@ struct ModesBeyond {
   int of(int kept) const { return as_many ? std::max(least, kept) : least; }
 };
 
+/// Frequencies up to which modes must go, by the names of bodies [rad/s].
+using Reach = std::map<std::string, double>;
+
 /// Clamped bodies get the lowest modes that are left out. They get the given number (ModesBeyond) of each kind that
 /// they have. They get half as many of other kinds, for what bends out of the hinge plane is left out, too. Some of
 /// these stretch and some twist. Static shapes of loads at the free end stand for them where no mode among many does.
 /// Other bases get so many in each plane. Bodies from files get the modes that their files have beyond those kept.
-/// Where the drives of the scene move faster vibrations than these show, booms get all modes up to there. Beams get
-/// them of finer elements.
+/// Booms get all modes up to their reach, where they have one. Beams get them of finer elements.
 /// @throws InputError, NumericalError as prepare_body.
-Scene with_more_modes(Scene, const ModesBeyond&, const DriveSpectra&, const RunHooks&);
+Scene with_more_modes(Scene, const ModesBeyond&, const Reach&, const RunHooks&);
+
+/// Of bodies whose vibrations the drives of the scene shake faster than such modes show.
+/// @throws InputError, NumericalError as prepare_body.
+Reach reach_of_drives(const Scene&, const ModesBeyond&, const DriveSpectra&, const RunHooks&);
+
+/// Modes by the names of bodies.
+using ShakenModes = std::map<std::string, std::vector<ShakenMode>>;
+
+/// What the motion of a run does to modes beyond those. @throws InputError, NumericalError as prepare_body and
+/// MotionSpectra.
+ShakenModes shaken_modes(const Scene&, const ModesBeyond&, const Reach&, const MotionSpectra&, const RunHooks&);
+
+/// A mode is worth taking in where its effect is so much of the tolerance.
+inline constexpr double counting_effect = 0.1;
+
+/// A reach that has all modes whose effect is more than the least.
+Reach with_shaken(Reach, const ShakenModes&, double least);
+bool any_counts(const ShakenModes&, double least);
+
+/// @throws InputError where the modes of a scene with more of them end before their reach.
+void require_reached(const Scene&, const Reach&, const RunHooks&);
 
 /// @throws InputError where the drives of a scene move faster vibrations than its modes show.
 void require_drives_shown(const Scene&, const DriveSpectra&, const RunHooks&);

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <map>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -118,9 +119,10 @@ std::string description(const OutputErrors&);
 /// wanted. What was not measured is unknown (NaN), and then so is the total.
 struct ErrorBudget : ErrorParts {
   std::vector<OutputErrors> outputs;
-  std::vector<std::string> missing;  // which part was not measured and why, one line each
-  bool measured = false;             // false: the repeats were not run, or not to their end
-  bool has_stiffened = false;        // geometric stiffness that the scene leaves open was switched on
+  std::vector<std::string> missing;     // which part was not measured and why, one line each
+  std::map<std::string, double> reach;  // up to which modes of bodies must go for tones that shake them [rad/s]
+  bool measured = false;                // false: the repeats were not run, or not to their end
+  bool has_stiffened = false;           // geometric stiffness that the scene leaves open was switched on
 
   /// The output with the largest known errors; nullptr where there is none.
   const OutputErrors* worst() const;

@@ -139,8 +139,10 @@ void Planner::note_still(const std::vector<Candidate>& list) {
     if (most <= unmoved * list.front().displacement && of.second != "other") still_[of.first].insert(of.second);
 }
 
-void Planner::note_shown(Scene& planned, const RunHooks& hooks) {
-  const Scene more = with_more_modes(planned, {}, DriveSpectra(planned), hooks);
+void Planner::note_shown(Scene& planned, const Reach& of_budget, const RunHooks& hooks) {
+  Reach reach = reach_of_drives(planned, {}, DriveSpectra(planned), hooks);
+  for (const auto& [body, wanted] : of_budget) reach[body] = std::max(reach[body], wanted);
+  const Scene more = with_more_modes(planned, {}, reach, hooks);
   for (const size_t i : open_) {
     planned.bodies[i].geometry = more.bodies[i].geometry;
     if (planned.bodies[i].basis.name != "clamped" || planned.bodies[i].directions != "all") continue;
@@ -396,11 +398,11 @@ bool Planner::improve(Scene& scene, const ErrorBudget& budget, const RunHooks& h
   const double time = known(worst->time), of_both = time > scene.tolerance / 3 ? 2 * time : time;
   const double others = std::max(of_both, known(worst->linearisation));
   if (std::max(truncation, discretisation) <= others) return false;
-  return truncation >= discretisation ? choose_from_more(scene, *worst, hooks, plan)
+  return truncation >= discretisation ? choose_from_more(scene, *worst, budget.reach, hooks, plan)
                                       : take_finer_elements(scene, *worst, plan);
 }
 
-bool Planner::choose_from_more(Scene& scene, const OutputErrors& worst, const RunHooks& hooks,
+bool Planner::choose_from_more(Scene& scene, const OutputErrors& worst, const Reach& reach, const RunHooks& hooks,
                                std::vector<std::string>& plan) {
   const double before = std::exchange(truncation_, worst.truncation);
   const bool is_far = truncation_ > before / 2 && truncation_ > not_near * scene.tolerance;
@@ -418,7 +420,7 @@ bool Planner::choose_from_more(Scene& scene, const OutputErrors& worst, const Ru
     return false;
   }
   candidates_ = std::min(candidates_ + candidates_ / 2, most_candidates);
-  note_shown(scene, hooks);
+  note_shown(scene, reach, hooks);
   too_few_ = kept_ + 1, too_few_of_whole_ = kept_of_whole_ + 1;
   plan.push_back(fmt::format("truncation: {:.1e} in {}; modes are chosen again, from {} of each body", worst.truncation,
                              worst.name, candidates_));

@@ -67,7 +67,8 @@ class Planner {
   bool is_hopeless_front(const OutputErrors&, double tolerance) const;
   /// Of the outputs that more modes or finer elements may mend; nullptr: those are within the tolerance.
   const OutputErrors* worst_to_mend(const Scene&, const ErrorBudget&, std::vector<std::string>& plan) const;
-  bool choose_from_more(Scene&, const OutputErrors& worst, const RunHooks&, std::vector<std::string>& plan);
+  bool choose_from_more(Scene&, const OutputErrors& worst, const Reach&, const RunHooks&,
+                        std::vector<std::string>& plan);
   bool take_finer_elements(Scene&, const OutputErrors& worst, std::vector<std::string>& plan);
   Scene with_first(const Scene& all, const std::vector<Candidate>&, size_t count) const;
 
@@ -75,7 +76,7 @@ class Planner {
 
   /// Modes beside those of the plan that have shown its truncation: candidates, too, from then on. The plan gets the
   /// elements that these had.
-  void note_shown(Scene& planned, const RunHooks&);
+  void note_shown(Scene& planned, const Reach&, const RunHooks&);
 
   std::vector<size_t> open_;                // bodies of the scene
   std::map<std::string, BodyScene> shown_;  // with these modes

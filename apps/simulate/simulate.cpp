@@ -50,6 +50,7 @@ IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, 
   o.loads = !scene.error_budget && wants_loads(scene);  // else the budget measures them
   o.duration = scene.duration;
   o.output_step = scene.output_step;
+  o.close_looks = hooks.close_looks;
   o.settle = scene.settle;
   o.rescale_at_events = scene.rescale_at_events;
   o.interrupt = hooks.interrupt;

@@ -72,6 +72,8 @@ struct RunHooks {
   /// the state there. Row 0 comes again where the flight begins anew.
   std::function<void(Run so_far, size_t first)> checkpoint{};
 
+  CloseLooks close_looks{};  // instead of the outputs of the scene, where there are any
+
   bool stopped() const { return interrupt != nullptr && interrupt->load(); }
 };
 

@@ -9,7 +9,7 @@
 
 namespace flexboom {
 
-long bearable_steps(const Run& run) { return 20 * run.motion.summary.steps + 20000; }
+long bearable_steps(const SimulatedMotion& run) { return 20 * run.motion.summary.steps + 20000; }
 
 Scene with_a_digit_more(Scene scene) {
   scene.integrator_tolerance = std::stod(fmt::format("{:.6g}", scene.step_tolerance() / 10));

@@ -8,7 +8,7 @@
 namespace flexboom {
 
 /// Steps that a flight in comparison with another may take; beyond, it costs too much.
-long bearable_steps(const Run&);
+long bearable_steps(const SimulatedMotion&);
 
 /// Of the integrator of a flight in comparison: below is round-off.
 inline constexpr double least_tolerance = 1e-13;

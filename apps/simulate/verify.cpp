@@ -38,10 +38,15 @@ struct Reference {
   bool other_basis = false;
 };
 
-std::vector<Reference> references(const Scene& scene, const std::string& used, const RunHooks& hooks) {
+std::vector<Reference> references(const Scene& scene, const RunResult& run, const RunHooks& hooks) {
   constexpr int more_orders = 4;
   const Scene cheap = by_cheapest_means(scene).value_or(scene);
-  const Scene modes = with_more_modes(cheap, {.least = 6, .as_many = true}, DriveSpectra(cheap), hooks);
+  const std::string& used = run.motion.summary.method;
+  const ModesBeyond beyond{.least = 6, .as_many = true};
+  const Reach of_drives = reach_of_drives(cheap, beyond, DriveSpectra(cheap), hooks);
+  const ShakenModes shaken = shaken_modes(cheap, beyond, of_drives, MotionSpectra(run.scene, run, hooks), hooks);
+  const Scene modes =
+      with_more_modes(cheap, beyond, with_shaken(of_drives, shaken, counting_effect * run.scene.tolerance), hooks);
   return {{"time: another method", by_another_method(scene, used)},
           {"time: the other formulation", in_the_other_formulation(scene)},
           {"truncation: twice the modes of each kind, six more at least", modes, 0, true},
@@ -60,7 +65,7 @@ std::vector<ReferenceCheck> reference_checks(const RunResult& r, const RunHooks&
   RunHooks quiet;
   quiet.interrupt = hooks.interrupt, quiet.bodies = hooks.bodies, quiet.ahead = hooks.ahead;
   std::vector<ReferenceCheck> checks;
-  const std::vector<Reference> all = references(scene, r.motion.summary.method, quiet);
+  const std::vector<Reference> all = references(scene, r, quiet);
   for (const Reference& reference : all) {
     if (hooks.stopped()) break;
     if (const Reference* next = &reference + 1; next != all.data() + all.size())

@@ -39,6 +39,13 @@ struct MotionScales {
   double angular_momentum = 0;  // the same [N m s]
 };
 
+/// Outputs that come in rows, so that a motion that is fast is seen now and then for a while.
+struct CloseLooks {
+  std::vector<double> at{};  // where the rows begin, ascending [s]
+  std::size_t count = 1;     // outputs in each
+  double step = 0;           // between them [s]
+};
+
 /// What every flight is asked for, whatever the coordinates and the method.
 struct FlightOptions {
   double tolerance = 1e-6;    // relative error wanted in every output (max over time / max of the output)
@@ -46,6 +53,7 @@ struct FlightOptions {
   double start = 0;           // [s]
   double duration = 10;       // [s], the time at the end
   double output_step = 0.01;  // [s]
+  CloseLooks close_looks{};   // empty: outputs are as above
   /// A hinge has settled when its rate on both sides of its stop stays below this fraction of its largest rate so far.
   /// Its crossings are then no longer located, and its stop counts as open, until its rate or its gap is twice what
   /// rest allows. Zero: never. Negative: a hundredth of the tolerance, no less than the tolerance or 1e-10.
@@ -114,7 +122,8 @@ void check_options(const FlightOptions&, std::size_t stops);
 /// The histories that a flight of so many stops begins with.
 std::vector<StopHistory> stops_at_start(const FlightOptions&, std::size_t stops);
 
-/// Times of outputs: the start, the multiples of the step after it, the end exactly.
+/// Times of outputs: the start, the multiples of the step after it, the end exactly. Or those of close looks, with the
+/// start before them and the end behind.
 class OutputTimes {
  public:
   explicit OutputTimes(const FlightOptions&);
@@ -122,8 +131,11 @@ class OutputTimes {
   double after(std::size_t count) const;
 
  private:
+  double close_look(std::size_t number) const;
+
   double start_, step_, end_;
   double before_;  // multiples of the step up to the start
+  CloseLooks looks_;
 };
 
 }  // namespace flexboom

@@ -111,6 +111,11 @@ JointLoad load_on_b(const tree::LinkScratch<double>& s) {
 }  // namespace
 
 PlaceMotionInSpace Tree::motion(double t, const Eigen::Ref<const VectorXd>& state, const Place& place) const {
+  return motions(t, state, {&place, 1}).front();
+}
+
+std::vector<PlaceMotionInSpace> Tree::motions(double t, const Eigen::Ref<const VectorXd>& state,
+                                              std::span<const Place> places) const {
   const tree::Model& model = impl_->model;
   VectorXd y = state;
   impose(t, y);
@@ -118,7 +123,10 @@ PlaceMotionInSpace Tree::motion(double t, const Eigen::Ref<const VectorXd>& stat
   tree::Instant instant(model);
   tree::set_instant(model, t, instant);
   tree::move_links(model, y.data(), instant, true, scratch);
-  return in_space(model, place, y, scratch);
+  std::vector<PlaceMotionInSpace> r;
+  r.reserve(places.size());
+  for (const Place& place : places) r.push_back(in_space(model, place, y, scratch));
+  return r;
 }
 
 std::vector<JointLoad> Tree::joint_loads(double t, const VectorXd& y, std::span<const char> contact,

@@ -129,6 +129,9 @@ class Tree {
   Balance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& y, TreeWorkspace&) const;
   Balance balance(double t, const Eigen::Ref<const Eigen::VectorXd>& state) const;
   PlaceMotionInSpace motion(double t, const Eigen::Ref<const Eigen::VectorXd>& state, const Place&) const;
+  /// Of several places: the bodies are moved once.
+  std::vector<PlaceMotionInSpace> motions(double t, const Eigen::Ref<const Eigen::VectorXd>& state,
+                                          std::span<const Place> places) const;
   std::vector<JointLoad> joint_loads(double t, const Eigen::VectorXd& y, std::span<const char> contact, TreeWorkspace&,
                                      std::span<const LawBranch> laws = {}) const;
 

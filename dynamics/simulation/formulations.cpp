@@ -20,11 +20,12 @@ using spatial::vec3;
 
 std::vector<BodyState> body_states(const Tree& tree, double t, const Eigen::Ref<const VectorXd>& y) {
   const TreeState of = tree.unpack(y);
+  std::vector<Place> origins(of.q.size());
+  for (size_t i = 0; i < origins.size(); ++i) origins[i].body = static_cast<int>(i);
+  const std::vector<PlaceMotionInSpace> motions = tree.motions(t, y, origins);
   std::vector<BodyState> states;
-  for (size_t i = 0; i < tree.scene().bodies.size(); ++i) {
-    Place origin;
-    origin.body = static_cast<int>(i);
-    const PlaceMotionInSpace brf = tree.motion(t, y, origin);
+  for (size_t i = 0; i < origins.size(); ++i) {
+    const PlaceMotionInSpace& brf = motions[i];
     const Eigen::Quaterniond turn(brf.axes);
     BodyState s;
     s.position = brf.position, s.velocity = brf.velocity;

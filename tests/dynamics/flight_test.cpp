@@ -40,6 +40,22 @@ TEST(OutputTimes, RoundOffMakesNoOutput) {
   }
 }
 
+TEST(OutputTimes, MayBeRowsOfCloseLooks) {
+  FlightOptions o;
+  o.duration = 1, o.close_looks = {.at = {0.25, 0.5}, .count = 3, .step = 0.0625};
+  const auto all = [&o] {
+    const OutputTimes times(o);
+    Times r;
+    for (double t = times.after(0); std::isfinite(t); t = times.after(r.size())) r.push_back(t);
+    return r;
+  };
+  EXPECT_EQ(all(), (Times{0, 0.25, 0.3125, 0.375, 0.5, 0.5625, 0.625, 1}));
+  o.close_looks.at[0] = 0;
+  EXPECT_EQ(all(), (Times{0, 0.0625, 0.125, 0.5, 0.5625, 0.625, 1}));
+  o.close_looks.at[0] = 0.4;
+  EXPECT_THROW(check_options(o, 0), InputError);
+}
+
 TEST(ChatterGuard, AThousandContactsAtOneTimeAreAnErrorThatNamesTheJoint) {
   ChatterGuard guard;
   for (int i = 0; i < 5000; ++i) guard.contact(1e-3 * i, "slow");

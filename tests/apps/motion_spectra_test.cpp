@@ -1,0 +1,159 @@
+// What the motion of a run does to vibrations that a model leaves out.
+
+#include "apps/simulate/motion_spectra.hpp"
+#include "apps/simulate/error_budget.hpp"
+#include "apps/simulate/modes_beyond.hpp"
+#include "tests/apps/run_testing.hpp"
+#include "tests/apps/scene_testing.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+namespace flexboom {
+namespace {
+
+// A slender boom on a heavy hub. Its frequencies are those of a clamped Euler-Bernoulli beam, nearly.
+const std::string boom_on_hub = R"toml(format = "flexboom-scene-1"
+name = "shaken"
+duration = 0.5
+output_step = 0.001
+[accuracy]
+tolerance = 1e-2
+outputs = ["boom.tip"]
+[[bodies]]
+name = "hub"
+mass = 50.0
+inertia = [20.0, 20.0, 20.0]
+[[bodies]]
+name = "boom"
+theory = "euler-bernoulli"
+order = 10
+rotary_inertia = false
+modes = 3
+damping = { rule = "modal", value = 0.002 }
+[[bodies.segments]]
+shape = "general"
+A = 2e-5
+Iy = 5e-10
+Iz = 1e-10
+J = 1e-10
+length = 2.0
+material = { E = 70e9, nu = 0.3, rho = 2700 }
+[[joints]]
+name = "hub"
+kind = "free"
+b = { body = "hub" }
+[[joints]]
+name = "clamp"
+kind = "fixed"
+a = { body = "hub" }
+b = { body = "boom", marker = "root" }
+[[loads]]
+name = "push"
+at = { body = "boom", marker = "tip" }
+force = [0, "2e-4*sin(2*pi*t)^2", 0]
+)toml";
+
+/// [rad/s]
+double clamped_frequency(double n) {
+  const double beta = (n - 0.5) * std::numbers::pi / 2.0;  // over the length; good to 1e-10 from n = 8
+  return beta * beta * std::sqrt(70e9 * 1e-10 / (2700 * 2e-5));
+}
+
+/// A mass of 1 kg on a spring that starts stretched and has this frequency beside the hub, on any place.
+std::string sprung_mass(double frequency, double start, const std::string& at = "body = \"hub\"", double mass = 1) {
+  return fmt::format(
+      "[[bodies]]\nname = \"mass\"\nmass = {0}\ninertia = [1e-8, 1e-8, 1e-8]\n[[joints]]\nname = \"spring\"\nkind = "
+      "\"slider\"\na = {{ {1}, x = [1, 0, 0], z = [0, 1, 0] }}\nb = {{ body = \"mass\" }}\nstiffness = {2:.12g}\nrest "
+      "= 0.0\nstart = {3}\n",
+      mass, at, mass * frequency * frequency, start);
+}
+
+/// An unbalanced rotor on the hub.
+std::string rotor(double rate) {
+  return fmt::format(
+      "[[bodies]]\nname = \"rotor\"\nmass = 1.0\ninertia = [1e-4, 1e-4, 1e-4]\ncentre = [1e-5, 0, 0]\n[[joints]]\nname "
+      "= "
+      "\"axle\"\nkind = \"hinge\"\na = {{ body = \"hub\" }}\nb = {{ body = \"rotor\" }}\nstart_rate = {}\n",
+      rate);
+}
+
+/// The error of the outputs of a run by one with many modes of its boom.
+double truth(const Scene& scene, const RunResult& r, int modes) {
+  Scene full = scene;
+  full.error_budget = false, full.tolerance = 1e-6;
+  for (BodyScene& b : full.bodies)
+    if (b.is_boom()) b.modes = modes, b.modes_auto = false, b.shapes.clear();
+  const OutputTable reference = without_coordinates(run_scene(full, {}).outputs);
+  return largest(compare_outputs(without_coordinates(r.outputs), reference, scene.outputs, floors_of(scene, r.bodies)));
+}
+
+/// The budget of a run with few modes knows what the tone does, and a plan takes the mode in.
+void expect_shown(const std::string& shaker, int modes) {
+  Scene scene = parse_scene(boom_on_hub + shaker, "shaken.toml");
+  const RunResult r = run_scene(scene, {});
+  const double error = truth(scene, r, modes);
+  EXPECT_GT(error, 3e-2);
+  EXPECT_GT(r.budget.truncation, 0.8 * error);
+  EXPECT_LT(r.budget.truncation, 3 * error);
+  scene.bodies[1].modes_auto = true;
+  const RunResult planned = run_scene(scene, {});
+  EXPECT_TRUE(planned.budget.within(scene.tolerance)) << planned.budget.total();
+  EXPECT_LT(truth(scene, planned, modes), scene.tolerance);
+}
+
+// A mass that rings at 0.04 mm beside the hub, in resonance with the tenth mode. Three modes and the next four know
+// nothing of it. Reference: 16 modes.
+TEST(MotionSpectra, ASprungMassShakesModesThatAreLeftOut) {
+  expect_shown(sprung_mass(clamped_frequency(10), 4e-5), 16);
+}
+
+TEST(MotionSpectra, ARotorShakesModesThatAreLeftOut) { expect_shown(rotor(clamped_frequency(10)), 16); }
+
+// The load of what is joined to the tip moves modes, too. How it gives way there takes 40 modes to show.
+TEST(MotionSpectra, AMassOnTheTipShakesModesThatAreLeftOut) {
+  expect_shown(sprung_mass(clamped_frequency(9.9), 3e-4, "body = \"boom\", marker = \"tip\"", 1e-4), 40);
+}
+
+/// What the motion does to modes beyond those of the scene and the next.
+ShakenModes shaken_modes(const std::string& shaker) {
+  const Scene scene = parse_scene(boom_on_hub + shaker, "shaken.toml");
+  Scene alone = scene;
+  alone.error_budget = false;
+  const RunResult r = run_scene(alone, {});
+  return shaken_modes(scene, {}, {}, MotionSpectra(scene, r, {}), {});
+}
+
+TEST(MotionSpectra, WhatIsFarFromAModeOrSmallDoesNotCount) {
+  EXPECT_TRUE(any_counts(shaken_modes(sprung_mass(clamped_frequency(10), 1e-5)), 1e-2));
+  EXPECT_FALSE(any_counts(shaken_modes(sprung_mass(clamped_frequency(10.5), 1e-5)), 1e-2));
+  EXPECT_FALSE(any_counts(shaken_modes(sprung_mass(clamped_frequency(10), 1e-8)), 1e-2));
+  EXPECT_TRUE(shaken_modes("").empty());  // nothing is as fast
+}
+
+// A tone that is set off near the end, where nothing was heard before.
+TEST(MotionSpectra, HearWhatAPulseSetsOff) {
+  const std::string plucked =
+      with(sprung_mass(clamped_frequency(10), 0), "rest = 0.0", "rest = 0.0\ndrive = \"300*((t>0.4)*(t<0.401))\"");
+  EXPECT_TRUE(any_counts(shaken_modes(plucked), 1e-2));
+}
+
+// They are those of the equations: a mass on a spring beside a heavy hub, and twice the rate of a rotor.
+TEST(MotionSpectra, KnowTheFastestVibrationAndTurn) {
+  const auto fastest = [](const std::string& shaker) {
+    const Scene scene = parse_scene(boom_on_hub + shaker, "shaken.toml");
+    Scene alone = scene;
+    alone.error_budget = false;
+    const RunResult r = run_scene(alone, {});
+    return MotionSpectra(scene, r, {}).fastest();
+  };
+  EXPECT_NEAR(fastest(sprung_mass(5000, 1e-4)), 5000 * std::sqrt(1 + 1 / 50.108), 20);
+  EXPECT_NEAR(fastest(rotor(3000)), 6000, 1);
+}
+
+}  // namespace
+}  // namespace flexboom
