@@ -4,17 +4,13 @@
 #include "apps/scene/wanted_accuracy.hpp"
 #include "apps/simulate/drives.hpp"
 #include "apps/simulate/tree_flight.hpp"
-#include "apps/simulate/variants.hpp"
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <functional>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -23,10 +19,8 @@
 namespace flexboom {
 
 using Eigen::Index;
-using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
-using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
@@ -34,18 +28,16 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr double near_a_mode = beyond_a_tone;
-
-std::span<const LawBranch> laws_at_end(const TreeTrajectory& motion) {
-  return motion.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(motion.laws.back());
+std::span<const LawBranch> laws_at(const TreeTrajectory& motion, size_t row) {
+  return motion.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(motion.laws[row]);
 }
 
-/// The largest |eigenvalue| of the equations at the last row [rad/s]: how J^2 makes a vector grow.
-double largest_vibration(const Tree& tree, const TreeTrajectory& motion) {
+/// The largest |eigenvalue| of the equations at a row [rad/s]: how J^2 makes a vector grow.
+double largest_vibration(const Tree& tree, const TreeTrajectory& motion, size_t row) {
   constexpr int before = 40, counted = 20;
-  const VectorXd& y = motion.y.back();
+  const VectorXd& y = motion.y[row];
   MatrixXd J(y.size(), y.size());
-  tree.jacobian(motion.time.back(), y.data(), closed_stops(tree, y), *tree.workspace(), J, laws_at_end(motion));
+  tree.jacobian(motion.time[row], y.data(), closed_stops(tree, y), *tree.workspace(), J, laws_at(motion, row));
   VectorXd x(y.size());
   for (Index i = 0; i < x.size(); ++i) x[i] = 1 + std::fmod(static_cast<double>(i) * std::numbers::phi, 1.0);
   double growth = 0;
@@ -92,7 +84,7 @@ Matrix6 mobility_at_end(const Tree& tree, const TreeTrajectory& motion, int body
   const auto derivative = [&](int acting) {
     on = acting;
     VectorXd y_dot(y.size());
-    other.derivative(t, y.data(), closed, *work, y_dot.data(), laws_at_end(motion));
+    other.derivative(t, y.data(), closed, *work, y_dot.data(), laws_at(motion, motion.y.size() - 1));
     return y_dot;
   };
   // Velocities are linear in rates, so changes of accelerations are what velocities are of changes of rates.
@@ -122,8 +114,8 @@ std::pair<double, double> band_of(const ReducedBody& b, Index mode, const Matrix
   Vector6 p;
   p << b.Ct.col(mode), b.Cr0.col(mode);
   const double left = 1 - p.dot(mobility * p) / b.Me(mode, mode);  // of its mass
-  const double shift = left > 0 ? std::min(near_a_mode, others / std::sqrt(left)) : near_a_mode;
-  return {w / (is_joined ? near_a_mode : others), w * shift};
+  const double shift = left > 0 ? std::min(beyond_a_tone, others / std::sqrt(left)) : beyond_a_tone;
+  return {w / (is_joined ? beyond_a_tone : others), w * shift};
 }
 
 /// What the outputs wanted are.
@@ -142,57 +134,6 @@ struct Wanted {
   }
 };
 
-/// A load on a body at one of its markers, inertial axes.
-struct LoadAtMarker {
-  Vector3d force = Vector3d::Zero(), torque = Vector3d::Zero();
-};
-
-/// One end of a joint or a spring that a body has at a marker.
-struct End {
-  const Place *here = nullptr, *there = nullptr;
-  bool is_b = false;                     // of the two
-  const SpringDamper* spring = nullptr;  // nullptr: it is that of a joint
-  Index column = -1;                     // of the outputs, of the joint's force on b; -1: it has none
-};
-
-LoadAtMarker of_spring(const SpringDamper& s, const PlaceMotionInSpace& here, const PlaceMotionInSpace& there) {
-  const Vector3d way = there.position - here.position;
-  const double length = way.norm();
-  if (!(length > 0)) return {};
-  const Vector3d along = way / length;
-  const double rate = along.dot(there.velocity - here.velocity);
-  return {(s.stiffness * (length - s.free_length) + s.damping * rate) * along};
-}
-
-/// `load`: force and torque on b, its axes.
-LoadAtMarker of_joint(const Vector6& load, const PlaceMotionInSpace& a, const PlaceMotionInSpace& b, bool is_b) {
-  const Vector3d force = b.axes * load.head<3>(), torque = b.axes * load.tail<3>();
-  if (is_b) return {force, torque};
-  return {-force, -torque - (b.position - a.position).cross(force)};
-}
-
-/// Of the force of a joint on its place b, before that of its torque; -1: it has none.
-Index column_of_load(const OutputTable& outputs, const std::string& joint) {
-  const auto column = std::ranges::find(outputs.names, joint + ".force.x");
-  return column == outputs.names.end() ? -1 : column - outputs.names.begin();
-}
-
-/// What is joined to a body where its modes move it.
-std::vector<End> ends_on(int body, const ReducedBody& all, const Multibody& bodies, const OutputTable& outputs) {
-  std::vector<End> ends;
-  const auto moves = [&all](const Place& place) {
-    const auto at = std::ranges::find(all.markers, place.marker, &Marker::name);
-    return at != all.markers.end() && !(at->S.isZero(0) && at->S_theta.isZero(0));
-  };
-  const auto add = [&](const Place& a, const Place& b, const SpringDamper* spring, Index column) {
-    if (a.body == body && moves(a)) ends.push_back({&a, &b, false, spring, column});
-    if (b.body == body && moves(b)) ends.push_back({&b, &a, true, spring, column});
-  };
-  for (const Joint& j : bodies.joints) add(j.a, j.b, nullptr, column_of_load(outputs, j.name));
-  for (const SpringDamper& s : bodies.springs) add(s.a, s.b, &s, -1);
-  return ends;
-}
-
 int index_of(const Tree& tree, const std::string& body) {
   const auto& bodies = tree.scene().bodies;
   return static_cast<int>(std::ranges::find(bodies, body, &ReducedBody::name) - bodies.begin());
@@ -202,164 +143,18 @@ int index_of(const Tree& tree, const std::string& body) {
 
 double MotionSpectra::fastest() const {
   constexpr double square = 2;  // what turns at a rate shakes at twice that, too
-  if (fastest_ < 0 && !run_.motion.y.empty())
-    fastest_ = std::max(largest_vibration(*run_.tree, run_.motion), square * largest_turn(*run_.tree, run_.motion));
-  return std::max(fastest_, 0.0);
+  if (fastest_ >= 0) return fastest_;
+  const TreeTrajectory& motion = run_.motion;
+  fastest_ = square * largest_turn(*run_.tree, motion);
+  for (const size_t row : {size_t{0}, motion.y.size() - 1})
+    fastest_ = std::max(fastest_, largest_vibration(*run_.tree, motion, row));
+  return fastest_;
 }
 
-namespace {
-
-/// Are loads of joints needed? They are where the outputs want them, or where something is joined to what bends.
-bool needs_loads(const Scene& scene, const SimulatedMotion& run) {
-  if (Wanted(scene).loads) return true;
-  const Multibody bodies = make_multibody(scene, run.bodies);
-  for (size_t b = 0; b < bodies.bodies.size(); ++b)
-    if (!ends_on(static_cast<int>(b), bodies.bodies[b], bodies, {}).empty()) return true;
-  return false;
-}
-
-/// When something may set tones off: a force has a corner or is largest, a stop is met, a law changes.
-std::vector<double> beginnings(const Scene& scene, const SimulatedMotion& run) {
-  IntegratorOptions o;
-  o.duration = scene.duration;
-  set_corners(scene, o);
-  std::vector<double> times = std::move(o.corners);
-  times.insert(times.end(), o.telling_times.begin(), o.telling_times.end());
-  for (const StopEvent& e : run.motion.events) times.push_back(e.time);
-  std::ranges::sort(times);
-  return times;
-}
-
-/// So many of these times at most: those that come after the longest quiet.
-std::vector<double> after_quiet(const std::vector<double>& times, size_t most) {
-  std::vector<std::pair<double, double>> quiet;  // how long, and when it ended
-  for (size_t i = 0; i < times.size(); ++i) quiet.emplace_back(times[i] - (i > 0 ? times[i - 1] : 0), times[i]);
-  std::ranges::sort(quiet, std::greater<>());
-  quiet.resize(std::min(quiet.size(), most));
-  std::vector<double> r;
-  for (const auto& [length, time] : quiet) r.push_back(time);
-  return r;
-}
-
-/// Where rows of so many seconds begin: at the start, at those times, evenly between, and before the end.
-std::vector<double> rows_at(const std::vector<double>& times, double length, double duration) {
-  constexpr int evenly = 6;
-  std::vector<double> at;
-  const auto add = [&](double t) {
-    const auto is_near = [&](double other) { return std::abs(other - t) <= length; };
-    if (t + length < duration && std::ranges::none_of(at, is_near)) at.push_back(t);
-  };
-  add(0);
-  std::ranges::for_each(times, add);
-  add(duration - 1.01 * length);
-  for (int i = 1; i < evenly; ++i) add(duration * i / evenly);
-  std::ranges::sort(at);
-  return at;
-}
-
-}  // namespace
-
-const MotionSpectra::Record& MotionSpectra::record(double slowest) const {
-  if (record_ && slowest >= record_->slowest) return *record_;
-  constexpr double per_period = 4, periods = 12, few = 64, many = 4096;
-  constexpr size_t most_beginnings = 6;
-  Scene scene = with_joints(flown_);
-  scene.verify = false;
-  if (needs_loads(scene, run_))
-    for (JointScene& j : scene.joints) j.loads = true;
-  const double step = 2 * std::numbers::pi / (per_period * fastest());
-  const double longest = std::max(std::floor(scene.duration / step), few);
-  const double samples = std::clamp(per_period * periods * fastest() / slowest, few, std::min(many, longest));
-  Record r;
-  r.slowest = slowest;
-  r.samples = std::bit_floor(static_cast<size_t>(samples));
-  RunHooks hooks = hooks_;
-  const double length = step * static_cast<double>(r.samples);
-  std::vector<double> at = rows_at(after_quiet(beginnings(scene, run_), most_beginnings), length, scene.duration);
-  if (length * static_cast<double>(at.size()) < scene.duration / 2) {
-    hooks.close_looks = {std::move(at), r.samples + 1, step};
-  } else {
-    scene.output_step = std::min(step, scene.duration / static_cast<double>(r.samples));
-  }
-  r.motion = fly_once(scene, hooks, 0, bearable_steps(run_));
-  const std::vector<double>& times = r.motion.motion.time;
-  if (r.motion.motion.summary.interrupted) throw NumericalError("interrupted");
-  const size_t between = hooks.close_looks.at.empty() ? r.samples : r.samples + 1;
-  for (size_t first = 0; first + r.samples < times.size(); first += between) r.windows.push_back(first);
-  for (size_t i = 0; i < r.windows.size(); ++i)
-    r.lasting.push_back((i + 1 < r.windows.size() ? times[r.windows[i + 1]] : scene.duration) - times[r.windows[i]]);
-  r.step = times[1] - times[0];
-  r.add_accelerations();
-  return record_.emplace(std::move(r));
-}
-
-namespace {
-
-/// Of the frame of a body from one row to the next: acceleration and angular acceleration, its axes.
-Vector6 acceleration(const PlaceMotionInSpace& before, const PlaceMotionInSpace& now, double step) {
-  const Matrix3d to_body = (before.axes + now.axes).transpose() / 2;
-  Vector6 a;
-  a << to_body * (now.velocity - before.velocity),
-      now.axes.transpose() * now.omega - before.axes.transpose() * before.omega;
-  return a / step;
-}
-
-}  // namespace
-
-void MotionSpectra::Record::add_accelerations() {
-  const Tree& tree = *motion.tree;
-  std::vector<Place> origins(tree.scene().bodies.size());
-  for (size_t b = 0; b < origins.size(); ++b) origins[b].body = static_cast<int>(b);
-  accelerations.resize(origins.size());
-  const auto moved = [&](size_t row) { return tree.motions(motion.motion.time[row], motion.motion.y[row], origins); };
-  for (const size_t first : windows) {
-    for (auto& of_body : accelerations) of_body.emplace_back(static_cast<Index>(samples), 6);
-    std::vector<PlaceMotionInSpace> before = moved(first);
-    for (size_t i = 0; i < samples; ++i) {
-      std::vector<PlaceMotionInSpace> now = moved(first + i + 1);
-      for (size_t b = 0; b < origins.size(); ++b)
-        accelerations[b].back().row(static_cast<Index>(i)) = acceleration(before[b], now[b], step).transpose();
-      before = std::move(now);
-    }
-  }
-}
-
-MotionSpectra::Driven MotionSpectra::driven(const ReducedBody& all, const Record& record) const {
-  const SimulatedMotion& motion = record.motion;
-  const int body = index_of(*motion.tree, all.name);
-  const Multibody bodies = make_multibody(with_joints(flown_), motion.bodies);
-  const std::vector<End> ends = ends_on(body, all, bodies, motion.outputs);
-  std::vector<Place> places(1);  // the body, then here and there of each end
-  places[0].body = body;
-  Driven r;
-  for (const End& end : ends) {
-    if (std::ranges::find(r.markers, end.here->marker) == r.markers.end()) r.markers.push_back(end.here->marker);
-    places.push_back(*end.here), places.push_back(*end.there);
-  }
-  const auto columns = static_cast<Index>(6 + 6 * r.markers.size());
-  for (size_t w = 0; w < record.windows.size(); ++w) {
-    MatrixXd& signals = r.signals.emplace_back(MatrixXd::Zero(static_cast<Index>(record.samples), columns));
-    signals.leftCols<6>() = record.accelerations[static_cast<size_t>(body)][w];
-    for (Index i = 0; i < signals.rows() && !ends.empty(); ++i) {
-      const size_t row = record.windows[w] + static_cast<size_t>(i) + 1;
-      const std::vector<PlaceMotionInSpace> now =
-          motion.tree->motions(motion.motion.time[row], motion.motion.y[row], places);
-      for (size_t e = 0; e < ends.size(); ++e) {
-        const End& end = ends[e];
-        const PlaceMotionInSpace &here = now[1 + 2 * e], &there = now[2 + 2 * e];
-        LoadAtMarker load;
-        if (end.spring != nullptr)
-          load = of_spring(*end.spring, here, there);
-        else if (end.column >= 0)
-          load = of_joint(motion.outputs.values.row(static_cast<Index>(row)).segment<6>(end.column).transpose(),
-                          end.is_b ? there : here, end.is_b ? here : there, end.is_b);
-        const auto marker = std::ranges::find(r.markers, end.here->marker) - r.markers.begin();
-        signals.row(i).segment<3>(6 + 6 * marker) += now[0].axes.transpose() * load.force;
-        signals.row(i).segment<3>(9 + 6 * marker) += now[0].axes.transpose() * load.torque;
-      }
-    }
-  }
-  return r;
+const MotionRecord& MotionSpectra::record(double slowest) const {
+  if (!record_ || slowest < record_->slowest())
+    record_.emplace(flown_, run_, hooks_, fastest(), slowest, Wanted(with_joints(flown_)).loads);
+  return *record_;
 }
 
 namespace {
@@ -445,7 +240,7 @@ struct MotionSpectra::Sizes {
   double force = 0, torque = 0;      // of the joint that carries it
 };
 
-MotionSpectra::Sizes MotionSpectra::sizes_of(const std::string& name, const Record& record) const {
+MotionSpectra::Sizes MotionSpectra::sizes_of(const std::string& name, const MotionRecord& record) const {
   constexpr double still = 1e-9;  // of its length: round-off
   Sizes r;
   const Tree& tree = *run_.tree;
@@ -466,26 +261,20 @@ MotionSpectra::Sizes MotionSpectra::sizes_of(const std::string& name, const Reco
   if (!wanted.rates) r.speed = std::numeric_limits<double>::infinity();
   r.force = r.torque = std::numeric_limits<double>::infinity();
   if (!wanted.loads) return r;
-  const OutputTable& outputs = record.motion.outputs;
-  for (const JointScene& j : with_joints(flown_).joints) {
-    if (j.b.body != name || j.closes_loop) continue;
-    const Index column = column_of_load(outputs, j.name);
-    if (column < 0) continue;
-    r.force = outputs.values.middleCols<3>(column).rowwise().norm().maxCoeff();
-    r.torque = outputs.values.middleCols<3>(column + 3).rowwise().norm().maxCoeff();
-  }
+  const MotionRecord::Loads loads = record.loads_of(name);
+  if (loads.force > 0) r.force = loads.force, r.torque = loads.torque;
   return r;
 }
 
 std::vector<ShakenMode> MotionSpectra::shaken_beyond(const ReducedBody& all, double shown) const {
   constexpr double last = 0.75;
-  const double slowest = shown / near_a_mode;
+  const double slowest = shown / beyond_a_tone;
   if (!(fastest() > slowest)) return {};
-  const Record& record = this->record(slowest);
-  const Driven driven = this->driven(all, record);
+  const MotionRecord& record = this->record(slowest);
+  const MotionRecord::Driven driven = record.driven(all);
   const Sizes sizes = sizes_of(all.name, record);
   const Deflection deflection(all);
-  const double step = std::numbers::pi / (static_cast<double>(record.samples) * record.step);
+  const double step = std::numbers::pi / (static_cast<double>(record.samples()) * record.step());
   std::vector<std::vector<Spectrum>> spectra;
   for (const MatrixXd& window : driven.signals) spectra.push_back(windowed_spectra(window));
   const auto bins = [&](double from, double to) -> Band {
@@ -497,7 +286,7 @@ std::vector<ShakenMode> MotionSpectra::shaken_beyond(const ReducedBody& all, dou
   /// What the motion does in a band to a mode like k, and at which frequency.
   const auto shaken = [&](Index k, double from, double to) -> ShakenMode {
     constexpr double wide = 2;
-    const Peak peak = peak_of(spectra, record.lasting, shares_of(all, k, driven.markers),
+    const Peak peak = peak_of(spectra, record.lasting(), shares_of(all, k, driven.markers),
                               bins(from, std::min(to, fastest())), bins(from / wide, to * wide));
     if (!peak.stands_out) return {};
     const double zeta = all.De(k, k) / (2 * all.Me(k, k) * all.frequency(k)), w = step * static_cast<double>(peak.bin);
@@ -520,9 +309,9 @@ std::vector<ShakenMode> MotionSpectra::shaken_beyond(const ReducedBody& all, dou
     const double w = all.frequency(k);
     const auto [from, to] = band_of(all, k, mobility, !driven.markers.empty());
     if (w > shown) r.push_back({w, shaken(k, from, to).effect});
-    if (!(w > last * highest && highest < near_a_mode * fastest())) continue;
-    const ShakenMode alike = shaken(k, highest / near_a_mode, fastest());
-    r.push_back({near_a_mode * alike.frequency, alike.effect});
+    if (!(w > last * highest && highest < beyond_a_tone * fastest())) continue;
+    const ShakenMode alike = shaken(k, highest / beyond_a_tone, fastest());
+    r.push_back({beyond_a_tone * alike.frequency, alike.effect});
   }
   return r;
 }

@@ -1,8 +1,7 @@
 #pragma once
 
+#include "apps/simulate/motion_record.hpp"
 #include "apps/simulate/simulate.hpp"
-
-#include <Eigen/Core>
 
 #include <optional>
 #include <string>
@@ -28,7 +27,8 @@ class MotionSpectra {
   MotionSpectra(const Scene& flown, const SimulatedMotion& run, const RunHooks& hooks)
       : flown_(flown), run_(run), hooks_(hooks) {}
 
-  /// Nothing in the run vibrates or turns faster, nor does what goes with the square of a turn [rad/s].
+  /// As it begins and ends, the run vibrates no faster. Nothing in it turns at more than half of this: what goes with
+  /// the square of a turn is twice as fast [rad/s].
   double fastest() const;
 
   /// The modes of a body beyond `shown` [rad/s]. `all`: the body of the scene with as many modes as there are. Those
@@ -37,36 +37,16 @@ class MotionSpectra {
   std::vector<ShakenMode> shaken_beyond(const ReducedBody& all, double shown) const;
 
  private:
-  /// Some parts of the run, with rows as close as its fastest vibrations want.
-  struct Record {
-    SimulatedMotion motion;
-    double slowest = 0;             // that these parts are long enough for [rad/s]
-    double step = 0;                // of their rows [s]
-    size_t samples = 0;             // in each
-    std::vector<size_t> windows{};  // their first rows
-    std::vector<double> lasting{};  // until the next one begins [s]
-    /// Per body and part: acceleration and angular acceleration of the BRF, its axes, six columns.
-    std::vector<std::vector<Eigen::MatrixXd>> accelerations{};
-
-    void add_accelerations();
-  };
-  /// What drives the modes of a body.
-  struct Driven {
-    std::vector<Eigen::MatrixXd> signals{};  // per part: its accelerations, then force and torque at each marker, BRF
-                                             // axes: six columns each
-    std::vector<std::string> markers{};      // where something is joined to the body
-  };
   struct Sizes;
 
-  const Record& record(double slowest) const;
-  Driven driven(const ReducedBody&, const Record&) const;
-  Sizes sizes_of(const std::string& body, const Record&) const;
+  const MotionRecord& record(double slowest) const;
+  Sizes sizes_of(const std::string& body, const MotionRecord&) const;
 
   const Scene& flown_;
   const SimulatedMotion& run_;
   const RunHooks& hooks_;
   mutable double fastest_ = -1;  // not known yet
-  mutable std::optional<Record> record_;
+  mutable std::optional<MotionRecord> record_;
 };
 
 }  // namespace flexboom
