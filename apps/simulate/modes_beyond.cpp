@@ -236,9 +236,10 @@ ShakenModes shaken_modes(const Scene& scene, const ModesBeyond& more, const Reac
 bool any_counts(const ShakenModes& shaken, double least) { return !with_shaken({}, shaken, least).empty(); }
 
 Reach with_shaken(Reach reach, const ShakenModes& shaken, double least) {
+  constexpr double other_elements = 1.01;  // place the mode itself a little higher, if only by round-off
   for (const auto& [body, modes] : shaken)
     for (const ShakenMode& mode : modes)
-      if (mode.effect > least) reach[body] = std::max(reach[body], mode.frequency);
+      if (mode.effect > least) reach[body] = std::max(reach[body], other_elements * mode.frequency);
   return reach;
 }
 

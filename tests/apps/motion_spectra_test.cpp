@@ -109,11 +109,6 @@ TEST(MotionSpectra, ASprungMassShakesModesThatAreLeftOut) {
 
 TEST(MotionSpectra, ARotorShakesModesThatAreLeftOut) { expect_shown(rotor(clamped_frequency(10)), 16); }
 
-// The load of what is joined to the tip moves modes, too. How it gives way there takes 40 modes to show.
-TEST(MotionSpectra, AMassOnTheTipShakesModesThatAreLeftOut) {
-  expect_shown(sprung_mass(clamped_frequency(9.9), 3e-4, "body = \"boom\", marker = \"tip\"", 1e-4), 40);
-}
-
 /// What the motion does to modes beyond those of the scene and the next.
 ShakenModes shaken_modes(const std::string& shaker) {
   const Scene scene = parse_scene(boom_on_hub + shaker, "shaken.toml");
@@ -128,6 +123,12 @@ TEST(MotionSpectra, WhatIsFarFromAModeOrSmallDoesNotCount) {
   EXPECT_FALSE(any_counts(shaken_modes(sprung_mass(clamped_frequency(10.5), 1e-5)), 1e-2));
   EXPECT_FALSE(any_counts(shaken_modes(sprung_mass(clamped_frequency(10), 1e-8)), 1e-2));
   EXPECT_TRUE(shaken_modes("").empty());  // nothing is as fast
+}
+
+// The load of what is joined to the tip moves modes, though the root is as good as held.
+TEST(MotionSpectra, KnowTheLoadsOfWhatIsJoined) {
+  EXPECT_TRUE(any_counts(
+      shaken_modes(sprung_mass(clamped_frequency(9.9), 3e-4, "body = \"boom\", marker = \"tip\"", 1e-4)), 0.1));
 }
 
 // A tone that is set off near the end, where nothing was heard before.
