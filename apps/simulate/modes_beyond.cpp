@@ -188,10 +188,6 @@ BodyScene with_more_modes(const BodyScene& b, const ModesBeyond& more, double re
   return with_stretching(with_more_of_whole(b, more, reach, keep, hooks), b, keep, hooks);
 }
 
-}  // namespace
-
-namespace {
-
 /// A body from a file has the modes beyond its own that are there.
 BodyScene with_modes_of_its_file(BodyScene b) {
   if (!b.richer || !b.richer->more_modes) return b;
@@ -201,6 +197,12 @@ BodyScene with_modes_of_its_file(BodyScene b) {
 }
 
 bool is_elastic(const BodyScene& b) { return !b.rigid && b.structure != "rigid"; }
+
+/// 0: it has none.
+double reach_of(const BodyScene& b, const Reach& reach) {
+  const auto of_body = reach.find(b.name);
+  return of_body != reach.end() ? of_body->second : 0;
+}
 
 }  // namespace
 
@@ -224,8 +226,7 @@ ShakenModes shaken_modes(const Scene& scene, const ModesBeyond& more, const Reac
     const auto richer = [&](double to) {
       return b.is_boom() ? with_more_modes(b, more, to, scene.bodies_kept_in, hooks) : with_modes_of_its_file(b);
     };
-    const auto of_drives = reach.find(b.name);
-    const BodyScene shown = richer(of_drives != reach.end() ? of_drives->second : 0);
+    const BodyScene shown = richer(reach_of(b, reach));
     const double highest = span_of(shown, scene.bodies_kept_in, hooks).highest, all = beyond_a_tone * motion.fastest();
     if (!(highest > 0 && all > highest)) continue;
     shaken[b.name] = motion.shaken_beyond(prepared(richer(all), 0, scene.bodies_kept_in, hooks).body, highest);
@@ -247,14 +248,9 @@ Scene with_more_modes(Scene scene, const ModesBeyond& more, const Reach& reach_o
   for (BodyScene& b : scene.bodies) {
     b = with_modes_of_its_file(std::move(b));
     if (b.structure == "rigid" || !b.is_boom()) continue;
-    const auto wanted = reach_of_bodies.find(b.name);
-    const double reach = wanted != reach_of_bodies.end() ? wanted->second : 0;
-    BodyScene richer = with_more_modes(b, more, 0, scene.bodies_kept_in, hooks);
-    if (reach > 0) {
-      if (b.structure == "beam") b.geometry = refined(b.geometry, 2);  // a resonance needs the right frequency
-      richer = with_more_modes(b, more, reach, scene.bodies_kept_in, hooks);
-    }
-    b = std::move(richer);
+    const double reach = reach_of(b, reach_of_bodies);
+    if (reach > 0 && b.structure == "beam") b.geometry = refined(b.geometry, 2);  // a resonance needs its frequency
+    b = with_more_modes(b, more, reach, scene.bodies_kept_in, hooks);
     b = with_static_shapes(b, static_shapes_of_loads(scene, b));
   }
   return scene;
@@ -277,14 +273,14 @@ void require_drives_shown(const Scene& scene, const DriveSpectra& drives, const 
 void require_reached(const Scene& scene, const Reach& reach, const RunHooks& hooks) {
   constexpr double round_off = 1e-6;  // finer elements have lower frequencies
   for (const BodyScene& b : scene.bodies) {
-    const auto wanted = reach.find(b.name);
-    if (wanted == reach.end()) continue;
+    const double wanted = reach_of(b, reach);
+    if (wanted == 0) continue;
     const Span span = span_of(b, scene.bodies_kept_in, hooks);
-    if (wanted->second > (1 + round_off) * span.highest)
+    if (wanted > (1 + round_off) * span.highest)
       throw InputError(
           fmt::format("the motion shakes vibrations of body {} that take modes up to {:.4g} rad/s to show, and those "
                       "that are tried end at {:.4g} rad/s",
-                      b.name, wanted->second, span.highest));
+                      b.name, wanted, span.highest));
   }
 }
 

@@ -4,6 +4,7 @@
 #include "apps/simulate/error_budget.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
+#include "tests/apps/slender_boom.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -29,16 +30,7 @@ name = "boom"
 theory = "euler-bernoulli"
 rotary_inertia = false
 modes = 3
-damping = { rule = "modal", value = 0.002 }
-[[bodies.segments]]
-shape = "general"
-A = 2e-5
-Iy = 5e-10
-Iz = 1e-10
-J = 1e-10
-length = 2.0
-material = { E = 70e9, nu = 0.3, rho = 2700 }
-[[joints]]
+)toml" + slender_boom + R"toml([[joints]]
 name = "shaker"
 kind = "slider"
 a = { x = [1, 0, 0], z = [0, 1, 0] }
@@ -47,12 +39,6 @@ motion = "0.1*(1-cos(0.7*t))"
 )toml";
 
 std::string shaken_by(const std::string& motion) { return with(shaken, "0.1*(1-cos(0.7*t))", motion); }
-
-/// [rad/s]
-double clamped_frequency(int n) {
-  const double beta = (n - 0.5) * std::numbers::pi / 2.0;  // over the length; good to 1e-10 from n = 8
-  return beta * beta * std::sqrt(70e9 * 1e-10 / (2700 * 2e-5));
-}
 
 double fastest(const std::string& motion, double shown) {
   return DriveSpectra(parse_scene(shaken_by(motion), "shaken.toml")).fastest_beyond(10, shown);

@@ -5,6 +5,7 @@
 #include "apps/simulate/modes_beyond.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
+#include "tests/apps/slender_boom.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -34,16 +35,7 @@ theory = "euler-bernoulli"
 order = 10
 rotary_inertia = false
 modes = 3
-damping = { rule = "modal", value = 0.002 }
-[[bodies.segments]]
-shape = "general"
-A = 2e-5
-Iy = 5e-10
-Iz = 1e-10
-J = 1e-10
-length = 2.0
-material = { E = 70e9, nu = 0.3, rho = 2700 }
-[[joints]]
+)toml" + slender_boom + R"toml([[joints]]
 name = "hub"
 kind = "free"
 b = { body = "hub" }
@@ -57,12 +49,6 @@ name = "push"
 at = { body = "boom", marker = "tip" }
 force = [0, "2e-4*sin(2*pi*t)^2", 0]
 )toml";
-
-/// [rad/s]
-double clamped_frequency(double n) {
-  const double beta = (n - 0.5) * std::numbers::pi / 2.0;  // over the length; good to 1e-10 from n = 8
-  return beta * beta * std::sqrt(70e9 * 1e-10 / (2700 * 2e-5));
-}
 
 /// A mass of 1 kg on a spring that starts stretched and has this frequency beside the hub, on any place.
 std::string sprung_mass(double frequency, double start, const std::string& at = "body = \"hub\"", double mass = 1) {
