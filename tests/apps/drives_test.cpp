@@ -18,7 +18,7 @@ namespace flexboom {
 namespace {
 
 // A slender boom on a slider. Its frequencies are those of a clamped Euler-Bernoulli beam.
-const std::string shaken = R"toml(format = "flexboom-scene-1"
+const std::string shaken = std::string(R"toml(format = "flexboom-scene-1"
 name = "shaken"
 duration = 2.0
 output_step = 0.01
@@ -30,7 +30,7 @@ name = "boom"
 theory = "euler-bernoulli"
 rotary_inertia = false
 modes = 3
-)toml" + slender_boom + R"toml([[joints]]
+)toml") + slender_boom + R"toml([[joints]]
 name = "shaker"
 kind = "slider"
 a = { x = [1, 0, 0], z = [0, 1, 0] }

@@ -18,7 +18,7 @@ namespace flexboom {
 namespace {
 
 // A slender boom on a heavy hub. Its frequencies are those of a clamped Euler-Bernoulli beam, nearly.
-const std::string boom_on_hub = R"toml(format = "flexboom-scene-1"
+const std::string boom_on_hub = std::string(R"toml(format = "flexboom-scene-1"
 name = "shaken"
 duration = 0.5
 output_step = 0.001
@@ -35,7 +35,7 @@ theory = "euler-bernoulli"
 order = 10
 rotary_inertia = false
 modes = 3
-)toml" + slender_boom + R"toml([[joints]]
+)toml") + slender_boom + R"toml([[joints]]
 name = "hub"
 kind = "free"
 b = { body = "hub" }

@@ -4,12 +4,11 @@
 
 #include <cmath>
 #include <numbers>
-#include <string>
 
 namespace flexboom {
 
 /// The rest of a body, behind what a scene says of its model.
-inline const std::string slender_boom = R"toml(damping = { rule = "modal", value = 0.002 }
+inline constexpr char slender_boom[] = R"toml(damping = { rule = "modal", value = 0.002 }
 [[bodies.segments]]
 shape = "general"
 A = 2e-5
