@@ -2,6 +2,7 @@
 // against differences, and whole runs with the error they reach. Every figure stands beside one that was timed in the
 // same run.
 
+#include "apps/accuracy/output_errors.hpp"
 #include "dynamics/methods/ode.hpp"
 #include "dynamics/numerics/rotation.hpp"
 

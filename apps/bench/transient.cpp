@@ -1,7 +1,8 @@
 #include "apps/bench/transient.hpp"
 
+#include "apps/accuracy/output_errors.hpp"
+#include "apps/accuracy/variants.hpp"
 #include "apps/simulate/simulate.hpp"
-#include "apps/simulate/variants.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 

@@ -1,4 +1,4 @@
-#include "apps/simulate/compare.hpp"
+#include "apps/accuracy/compare.hpp"
 #include "apps/base/toml_reader.hpp"
 #include "apps/commands/commands.hpp"
 #include "apps/commands/terminal_line.hpp"

@@ -3,7 +3,7 @@
 #include "apps/model/prepared_body.hpp"
 #include "apps/scene/scene.hpp"
 #include "apps/simulate/flight_state.hpp"
-#include "apps/simulate/output_errors.hpp"
+#include "apps/simulate/output_table.hpp"
 #include "dynamics/methods/integrator.hpp"
 #include "dynamics/simulation/tree_integrator.hpp"
 
@@ -49,16 +49,6 @@ struct Run : SimulatedMotion {
   std::vector<std::string> notes;  // for the plan
 };
 
-/// The flight that a scene asks for, after whatever flights that took.
-struct RunResult : SimulatedMotion {
-  Scene scene;
-  ErrorBudget budget;
-  std::vector<ReferenceCheck> checks;  // where the scene is to be verified
-  std::vector<std::string> plan;       // what was chosen and why, one line each
-  std::vector<std::string> warnings;
-  double budget_seconds = 0;
-};
-
 class FlightsAhead;
 
 /// Beside a run.
@@ -76,11 +66,6 @@ struct RunHooks {
 
   bool stopped() const { return interrupt != nullptr && interrupt->load(); }
 };
-
-/// The whole chain. `so_far`: told of the run itself as RunHooks::checkpoint, not of its repeats.
-/// @throws InputError, NumericalError.
-RunResult run_scene(const Scene&, const RunHooks&,
-                    const std::function<void(const RunResult& so_far, size_t first)>& so_far = {});
 
 /// The balance that no run may have: far above any tolerance that is accepted for a step.
 inline constexpr double broken_balance = 0.01;

@@ -1,9 +1,9 @@
 #include "apps/sweep/runner.hpp"
 
+#include "apps/accuracy/planner.hpp"
+#include "apps/accuracy/time_error.hpp"
 #include "apps/model/static_shapes.hpp"
-#include "apps/simulate/planner.hpp"
 #include "apps/simulate/steady_motion.hpp"
-#include "apps/simulate/time_error.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 

@@ -1,8 +1,8 @@
 // What the error budget says, and what it must not say.
 
+#include "apps/accuracy/error_budget.hpp"
+#include "apps/accuracy/variants.hpp"
 #include "apps/results/results.hpp"
-#include "apps/simulate/error_budget.hpp"
-#include "apps/simulate/variants.hpp"
 #include "tests/apps/reduced_testing.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"

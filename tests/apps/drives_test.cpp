@@ -1,7 +1,7 @@
 // What functions of time do to vibrations that a model leaves out.
 
-#include "apps/simulate/drives.hpp"
-#include "apps/simulate/error_budget.hpp"
+#include "apps/accuracy/drive_spectra.hpp"
+#include "apps/accuracy/error_budget.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
 #include "tests/apps/slender_boom.hpp"

@@ -1,9 +1,9 @@
 // Scenes whose joints have laws: keys, runs in both formulations, with everything else that a scene may have.
 
+#include "apps/accuracy/error_budget.hpp"
 #include "apps/results/results.hpp"
 #include "apps/scene/scene.hpp"
 #include "apps/scene/scene_law.hpp"
-#include "apps/simulate/error_budget.hpp"
 #include "run_testing.hpp"
 
 #include <fmt/format.h>

@@ -1,8 +1,8 @@
 // What the motion of a run does to vibrations that a model leaves out.
 
-#include "apps/simulate/motion_spectra.hpp"
-#include "apps/simulate/error_budget.hpp"
-#include "apps/simulate/modes_beyond.hpp"
+#include "apps/accuracy/motion_spectra.hpp"
+#include "apps/accuracy/error_budget.hpp"
+#include "apps/accuracy/modes_beyond.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
 #include "tests/apps/slender_boom.hpp"

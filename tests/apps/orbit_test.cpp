@@ -1,5 +1,5 @@
+#include "apps/accuracy/run_scene.hpp"
 #include "apps/scene/scene.hpp"
-#include "apps/simulate/simulate.hpp"
 #include "dynamics/numerics/rotation.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "apps/simulate/output_errors.hpp"
+#include "apps/accuracy/output_errors.hpp"
 
 #include "fem/base/check.hpp"
 

@@ -1,6 +1,6 @@
 // What a scene with modes = "auto" is simulated with.
 
-#include "apps/simulate/planner.hpp"
+#include "apps/accuracy/planner.hpp"
 #include "apps/model/static_shapes.hpp"
 #include "fem/base/check.hpp"
 #include "tests/apps/run_testing.hpp"

@@ -2,7 +2,7 @@
 
 // Runs of scenes, and what is read from them.
 
-#include "apps/simulate/simulate.hpp"
+#include "apps/accuracy/run_scene.hpp"
 #include "fem/base/check.hpp"
 
 #include <gtest/gtest.h>

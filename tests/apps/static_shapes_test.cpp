@@ -1,8 +1,8 @@
 // Static shapes of the loads that joints put on booms.
 
 #include "apps/model/static_shapes.hpp"
+#include "apps/accuracy/error_budget.hpp"
 #include "apps/model/prepared_body.hpp"
-#include "apps/simulate/error_budget.hpp"
 #include "tests/apps/run_testing.hpp"
 
 #include <fmt/format.h>

@@ -5,6 +5,7 @@
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // Scenes with joints: what is read, written back and refused.
 
+#include "apps/accuracy/run_scene.hpp"
 #include "apps/results/results.hpp"
 #include "apps/scene/scene.hpp"
-#include "apps/simulate/simulate.hpp"
 #include "tests/apps/run_testing.hpp"
 #include "tests/apps/scene_testing.hpp"
 

@@ -1,4 +1,4 @@
-#include "apps/simulate/simulate.hpp"
+#include "apps/accuracy/run_scene.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
-#include "apps/simulate/motion_record.hpp"
+#include "apps/accuracy/motion_record.hpp"
 
+#include "apps/accuracy/variants.hpp"
 #include "apps/simulate/tree_flight.hpp"
-#include "apps/simulate/variants.hpp"
 #include "fem/base/check.hpp"
 
 #include <Eigen/Geometry>

@@ -3,10 +3,8 @@
 #include "apps/model/prepared_body.hpp"
 #include "apps/scene/scene.hpp"
 #include "apps/scene/wanted_accuracy.hpp"
+#include "apps/simulate/output_table.hpp"
 #include "dynamics/events/flight.hpp"
-#include "reduction/body/reduced_body.hpp"
-
-#include <Eigen/Core>
 
 #include <array>
 #include <map>
@@ -17,21 +15,6 @@
 
 /// How far the outputs of one run are from those of another. A vector is one output: "hub.rotation" has three columns.
 namespace flexboom {
-
-/// Names and values of the outputs of a run, one row per time: the columns of trajectory.csv.
-struct OutputTable {
-  std::vector<std::string> names;
-  Eigen::MatrixXd values;  // rows: times
-};
-
-/// Is a column an elastic coordinate, "boom.q2"?
-bool is_coordinate(const std::string& column);
-
-/// Is an output the force, the torque or the drive of a joint?
-bool is_load(const std::string& output);
-
-/// Is an output an attitude against a commanded one, or against the orbit's frame?
-bool is_pointing(const std::string& output);
 
 /// What makes of an output that hardly moves no more than it is: the errors that its scale must bear.
 struct OutputFloors {
@@ -104,12 +87,6 @@ struct OutputErrors : ErrorParts {
   /// The sum of what was measured.
   double known() const;
 };
-
-/// Deflections of a body are looked at in so many rows at most.
-inline constexpr Eigen::Index most_deflections = 20000;
-
-/// The elastic coordinates of a body, n per row.
-Eigen::MatrixXd coordinates_of(const OutputTable&, const ReducedBody&);
 
 /// Its name, when it is worst, and the largest part where that is known: "hub.rotation at t = 3.2 s, most of it
 /// truncation".

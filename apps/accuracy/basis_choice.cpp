@@ -1,8 +1,8 @@
 // Which modes a body has that its own motion stiffens: those at rest, or those of that motion.
 
-#include "apps/simulate/basis_choice.hpp"
+#include "apps/accuracy/basis_choice.hpp"
 
-#include "apps/simulate/error_budget.hpp"
+#include "apps/accuracy/error_budget.hpp"
 #include "apps/simulate/steady_motion.hpp"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-#include "apps/simulate/modes_beyond.hpp"
+#include "apps/accuracy/modes_beyond.hpp"
 
 #include "apps/model/prepared_body.hpp"
 #include "apps/model/static_shapes.hpp"

@@ -1,4 +1,4 @@
-#include "apps/simulate/fewest_enough.hpp"
+#include "apps/accuracy/fewest_enough.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
-#include "apps/simulate/late_vibrations.hpp"
+#include "apps/accuracy/late_vibrations.hpp"
 
+#include "apps/accuracy/output_errors.hpp"
 #include "apps/base/deflection.hpp"
-#include "apps/simulate/output_errors.hpp"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/simulate/error_budget.hpp"
+#include "apps/accuracy/error_budget.hpp"
 #include "apps/simulate/simulate.hpp"
 
 #include <map>

@@ -1,6 +1,7 @@
 #pragma once
 
-#include "apps/simulate/modes_beyond.hpp"
+#include "apps/accuracy/modes_beyond.hpp"
+#include "apps/accuracy/output_errors.hpp"
 #include "apps/simulate/simulate.hpp"
 
 #include <limits>
@@ -18,8 +19,5 @@ namespace flexboom {
 /// @throws InputError, NumericalError as run_scene.
 ErrorBudget measure_budget(Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan,
                            const StillKinds& still = {});
-
-/// Without the columns of elastic coordinates: those of another basis have other meanings.
-OutputTable without_coordinates(const OutputTable&);
 
 }  // namespace flexboom

@@ -1,4 +1,4 @@
-#include "apps/simulate/output_errors.hpp"
+#include "apps/accuracy/output_errors.hpp"
 
 #include "dynamics/numerics/rotation.hpp"
 #include "fem/base/check.hpp"
@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <map>
@@ -23,22 +22,6 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
-
-/// What follows the last dot.
-std::string last_word(const std::string& column) {
-  const auto dot = column.rfind('.');
-  return dot == std::string::npos ? column : column.substr(dot + 1);
-}
-
-/// "sip.q2" -> "sip.q", "hub.rotation.x" -> "hub.rotation", "sip.angle" -> "sip.angle".
-std::string output_of_column(const std::string& column) {
-  const std::string last = last_word(column);
-  if (last.size() == column.size()) return column;
-  std::string first = column.substr(0, column.size() - last.size() - 1);
-  if (last == "x" || last == "y" || last == "z") return first;
-  if (last.size() > 1 && last[0] == 'q' && std::isdigit(static_cast<unsigned char>(last[1]))) return first + ".q";
-  return column;
-}
 
 /// Is it an angle of the attitude against the orbit's frame?
 bool is_of_lvlh(const std::string& output) { return output.starts_with("lvlh."); }
@@ -111,14 +94,6 @@ double bearable(const WantedOutput& as, double size_of_output, const OutputFloor
 
 }  // namespace
 
-bool is_coordinate(const std::string& column) { return output_of_column(column).ends_with(".q"); }
-
-bool is_pointing(const std::string& output) { return output.ends_with(".pointing") || is_of_lvlh(output); }
-
-bool is_load(const std::string& output) {
-  return output.ends_with(".force") || output.ends_with(".torque") || output.ends_with(".drive");
-}
-
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted, const OutputFloors& floors) {
   std::vector<WantedOutput> asked, order;
@@ -163,13 +138,6 @@ double largest(const std::vector<OutputDifference>& differences) {
   double r = 0;
   for (const OutputDifference& d : differences) r = std::max(r, d.error);
   return r;
-}
-
-Eigen::MatrixXd coordinates_of(const OutputTable& outputs, const ReducedBody& body) {
-  if (body.n() == 0) return Eigen::MatrixXd(outputs.values.rows(), 0);
-  const auto first = std::ranges::find(outputs.names, body.name + ".q1") - outputs.names.begin();
-  require(first + body.n() <= outputs.values.cols(), fmt::format("outputs have no coordinates of body {}", body.name));
-  return outputs.values.middleCols(first, body.n());
 }
 
 std::pair<std::string_view, double> ErrorParts::largest_part() const {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/simulate/simulate.hpp"
+#include "apps/accuracy/run_scene.hpp"
 
 #include <string>
 #include <vector>

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "apps/accuracy/output_errors.hpp"
 #include "apps/simulate/simulate.hpp"
 
 #include <limits>

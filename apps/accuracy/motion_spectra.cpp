@@ -1,8 +1,8 @@
-#include "apps/simulate/motion_spectra.hpp"
+#include "apps/accuracy/motion_spectra.hpp"
 
+#include "apps/accuracy/drive_spectra.hpp"
 #include "apps/base/deflection.hpp"
 #include "apps/scene/wanted_accuracy.hpp"
-#include "apps/simulate/drives.hpp"
 #include "apps/simulate/tree_flight.hpp"
 
 #include <Eigen/Core>

@@ -1,7 +1,7 @@
 #pragma once
 
+#include "apps/accuracy/output_errors.hpp"
 #include "apps/scene/scene.hpp"
-#include "apps/simulate/output_errors.hpp"
 #include "apps/simulate/simulate.hpp"
 
 #include <string>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/simulate/motion_record.hpp"
+#include "apps/accuracy/motion_record.hpp"
 #include "apps/simulate/simulate.hpp"
 
 #include <optional>

@@ -1,15 +1,15 @@
 // The model of a scene that leaves it to the program: runs with fewer modes beside one with many.
 
-#include "apps/simulate/planner.hpp"
+#include "apps/accuracy/planner.hpp"
 
+#include "apps/accuracy/basis_choice.hpp"
+#include "apps/accuracy/error_budget.hpp"
+#include "apps/accuracy/fewest_enough.hpp"
+#include "apps/accuracy/time_error.hpp"
+#include "apps/accuracy/variants.hpp"
 #include "apps/model/prepared_body.hpp"
 #include "apps/model/static_shapes.hpp"
-#include "apps/simulate/basis_choice.hpp"
-#include "apps/simulate/error_budget.hpp"
-#include "apps/simulate/fewest_enough.hpp"
 #include "apps/simulate/flights_ahead.hpp"
-#include "apps/simulate/time_error.hpp"
-#include "apps/simulate/variants.hpp"
 #include "fem/base/check.hpp"
 #include "fem/booms/solid_boom.hpp"
 

@@ -1,4 +1,4 @@
-#include "apps/simulate/variants.hpp"
+#include "apps/accuracy/variants.hpp"
 
 #include <fmt/format.h>
 

@@ -1,8 +1,8 @@
-#include "apps/simulate/verify.hpp"
+#include "apps/accuracy/verify.hpp"
 
-#include "apps/simulate/error_budget.hpp"
+#include "apps/accuracy/error_budget.hpp"
+#include "apps/accuracy/variants.hpp"
 #include "apps/simulate/flights_ahead.hpp"
-#include "apps/simulate/variants.hpp"
 
 #include <algorithm>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include "apps/simulate/field_error.hpp"
+#include "apps/accuracy/field_error.hpp"
 
 #include "dynamics/environment/gravity_field.hpp"
 

@@ -1,5 +1,6 @@
-#include "apps/simulate/compare.hpp"
+#include "apps/accuracy/compare.hpp"
 
+#include "apps/accuracy/run_scene.hpp"
 #include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 #include "reduction/invariants/eq14.hpp"

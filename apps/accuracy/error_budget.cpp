@@ -1,13 +1,13 @@
-#include "apps/simulate/error_budget.hpp"
+#include "apps/accuracy/error_budget.hpp"
 
+#include "apps/accuracy/field_error.hpp"
+#include "apps/accuracy/late_vibrations.hpp"
+#include "apps/accuracy/time_error.hpp"
+#include "apps/accuracy/variants.hpp"
 #include "apps/model/bounded_modes.hpp"
 #include "apps/model/prepared_body.hpp"
 #include "apps/model/static_shapes.hpp"
-#include "apps/simulate/field_error.hpp"
 #include "apps/simulate/flights_ahead.hpp"
-#include "apps/simulate/late_vibrations.hpp"
-#include "apps/simulate/time_error.hpp"
-#include "apps/simulate/variants.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
@@ -23,18 +23,6 @@
 #include <vector>
 
 namespace flexboom {
-
-OutputTable without_coordinates(const OutputTable& table) {
-  OutputTable r;
-  std::vector<Eigen::Index> kept;
-  for (size_t i = 0; i < table.names.size(); ++i) {
-    if (is_coordinate(table.names[i])) continue;
-    r.names.push_back(table.names[i]);
-    kept.push_back(static_cast<Eigen::Index>(i));
-  }
-  r.values = table.values(Eigen::all, kept);
-  return r;
-}
 
 namespace {
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "apps/simulate/drives.hpp"
-#include "apps/simulate/motion_spectra.hpp"
+#include "apps/accuracy/drive_spectra.hpp"
+#include "apps/accuracy/motion_spectra.hpp"
 #include "apps/simulate/simulate.hpp"
 
 #include <algorithm>

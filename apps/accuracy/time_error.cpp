@@ -1,7 +1,7 @@
-#include "apps/simulate/time_error.hpp"
+#include "apps/accuracy/time_error.hpp"
 
+#include "apps/accuracy/variants.hpp"
 #include "apps/simulate/flights_ahead.hpp"
-#include "apps/simulate/variants.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
