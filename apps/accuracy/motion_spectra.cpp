@@ -125,7 +125,7 @@ struct Wanted {
   explicit Wanted(const Scene& scene) {
     for (const std::string& text : scene.outputs) {
       const std::string output = wanted_output(text).name;
-      rates = rates || unit_of(output).ends_with("/s");
+      rates = rates || unit_of(output, {}).ends_with("/s");
       loads = loads || is_load(output);
     }
     if (!scene.outputs.empty()) return;

@@ -59,7 +59,8 @@ VectorXd values_at(const OutputTable& table, Index row, const ColumnPlaces& colu
 std::map<std::string_view, double> largest_of_units(const OutputTable& table) {
   std::map<std::string_view, double> r;
   for (size_t i = 0; i < table.names.size(); ++i) {
-    const std::string_view unit = table.names[i] == "energy.kinetic" ? "J" : unit_of(output_of_column(table.names[i]));
+    const std::string_view unit =
+        table.names[i] == "energy.kinetic" ? "J" : unit_of(output_of_column(table.names[i]), table.names);
     if (unit.empty() || table.values.rows() == 0) continue;
     r[unit] = std::max(r[unit], table.values.col(static_cast<Index>(i)).cwiseAbs().maxCoeff());
   }
@@ -67,10 +68,8 @@ std::map<std::string_view, double> largest_of_units(const OutputTable& table) {
 }
 
 /// An error of this size is no more than round-off, or does not count. `size`: of the output in both tables.
-double bearable(const WantedOutput& as, double size_of_output, const OutputFloors& floors,
+double bearable(const WantedOutput& as, std::string_view unit, double size_of_output, const OutputFloors& floors,
                 const std::map<std::string_view, double>& all) {
-  const std::string& output = as.name;
-  const std::string_view unit = unit_of(output);
   const auto largest_in = [&all](std::string_view of_unit) {
     const auto found = all.find(of_unit);
     return found == all.end() ? 0.0 : found->second;
@@ -127,7 +126,8 @@ std::vector<OutputDifference> compare_outputs(const OutputTable& a, const Output
     }
     d.scale = d.size;
     if (as.accuracy > 0) d.scale = (as.unit.empty() ? as.accuracy * d.size : as.accuracy) / floors.tolerance;
-    d.scale = std::max(d.scale, bearable(as, std::max(d.size, size_of_a), floors, all) / floors.tolerance);
+    d.scale = std::max(
+        d.scale, bearable(as, unit_of(output, b.names), std::max(d.size, size_of_a), floors, all) / floors.tolerance);
     d.error = d.scale > 0 ? difference / d.scale : difference;
     result.push_back(d);
   }

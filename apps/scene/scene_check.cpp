@@ -64,6 +64,7 @@ void check_accuracy(Faults& faults, const Scene& scene) {
     WantedOutput wanted;
     try {
       wanted = wanted_output(text);
+      require_unit(wanted, known);
     } catch (const InputError& e) {
       faults.add("accuracy.outputs", e.what());
       continue;

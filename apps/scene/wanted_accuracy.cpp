@@ -39,22 +39,32 @@ WantedOutput wanted_output(const std::string& text) {
   require(understood, fmt::format("is '{}'; behind an output stands nothing, a relative error above zero, or an error "
                                   "and its unit: \"hub.rotation\", \"hub.rotation 1e-4\", \"hub.rotation 1e-9 rad\"",
                                   text));
-  const std::string_view unit = unit_of(r.name);
-  require(r.unit.empty() || r.unit == unit,
-          unit.empty() ? fmt::format("is '{}', but {} is no output that has a unit; give a relative error, or "
-                                     "check the name",
-                                     text, r.name)
-                       : fmt::format("is '{}', but {} is in {}", text, r.name, unit));
   return r;
 }
 
-std::string_view unit_of(const std::string& output) {
+void require_unit(const WantedOutput& wanted, const std::vector<std::string>& outputs) {
+  const std::string_view unit = unit_of(wanted.name, outputs);
+  require(wanted.unit.empty() || wanted.unit == unit,
+          unit.empty() ? fmt::format("has {0} in {1}, but {0} is no output that has a unit; give a relative error, or "
+                                     "check the name",
+                                     wanted.name, wanted.unit)
+                       : fmt::format("has {0} in {1}, but {0} is in {2}", wanted.name, wanted.unit, unit));
+}
+
+std::string_view unit_of(const std::string& output, const std::vector<std::string>& outputs) {
   static const std::map<std::string, std::string_view> units = {
       {"angle", "rad"},    {"angle1", "rad"}, {"angle2", "rad"}, {"rotation", "rad"}, {"pointing", "rad"},
       {"roll", "rad"},     {"pitch", "rad"},  {"yaw", "rad"},    {"rate", "rad/s"},   {"rate1", "rad/s"},
       {"rate2", "rad/s"},  {"spin", "rad/s"}, {"length", "m"},   {"position", "m"},   {"tip", "m"},
-      {"velocity", "m/s"}, {"force", "N"},    {"torque", "N m"}};
-  const auto found = units.find(output.substr(output.rfind('.') + 1));
+      {"velocity", "m/s"}, {"force", "N"},    {"torque", "N m"}, {"drive", "N m"},    {"drive1", "N m"},
+      {"drive2", "N m"}};
+  const size_t dot = output.rfind('.');
+  const std::string what = output.substr(dot + 1);
+  if (what == "rate" || what == "drive") {
+    const bool slides = std::ranges::find(outputs, output.substr(0, dot + 1) + "length") != outputs.end();
+    if (slides) return what == "rate" ? "m/s" : "N";
+  }
+  const auto found = units.find(what);
   return found == units.end() ? "" : found->second;
 }
 

@@ -24,13 +24,17 @@ struct WantedOutput {
   std::string unit{};   // that of the output
 };
 
-/// @throws InputError for anything else, and for a unit that is not that of the output.
+/// @throws InputError for anything else.
 WantedOutput wanted_output(const std::string& text);
+
+/// @throws InputError where it has a unit that is not that of the output. `outputs`: as unit_of.
+void require_unit(const WantedOutput&, const std::vector<std::string>& outputs);
 
 /// Is this output one of those that are named? @throws InputError as wanted_output.
 bool names_output(const std::vector<std::string>& wanted, const std::string& output);
 
-/// "m/s" of "hub.velocity"; empty of elastic coordinates, drives and energies.
-std::string_view unit_of(const std::string& output);
+/// "m/s" of "hub.velocity"; empty of elastic coordinates and energies. `outputs`: those beside it, which tell whether
+/// its joint slides.
+std::string_view unit_of(const std::string& output, const std::vector<std::string>& outputs);
 
 }  // namespace flexboom

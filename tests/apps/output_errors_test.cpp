@@ -98,6 +98,16 @@ TEST(OutputErrors, AbsoluteErrorsOfAUnitDoNotCount) {
   EXPECT_DOUBLE_EQ(with("1 rad"), 0.5);  // another unit
 }
 
+TEST(OutputErrors, RatesOfSlidersAreMetresPerSecond) {
+  const std::vector<std::string> names = {"t", "slide.length", "slide.rate"};
+  const OutputTable a = table(names, {0, 1, 1e-9}, {1, 1, 1e-9}), b = table(names, {0, 1, 2e-9}, {1, 1, 2e-9});
+  const auto with = [&](const char* text) {
+    return only(compare_outputs(a, b, {"slide.rate"}, {.tolerance = 1e-3, .absolute = {absolute_error(text)}})).error;
+  };
+  EXPECT_LE(with("1.001e-9 m/s"), 1e-3);
+  EXPECT_GT(with("1 rad/s"), 0.1);  // another unit
+}
+
 TEST(OutputErrors, AnOutputMayHaveAnAccuracyOfItsOwn) {
   const OutputTable a = table(hub, {0, 3, 4e-6, 0}, {1, 1, 0, 0}), b = table(hub, {0, 3, 0, 0}, {1, 1, 0, 0});
   constexpr double tolerance = 1e-5;
@@ -119,9 +129,19 @@ TEST(OutputErrors, WantedOutputsAreANameAnAccuracyAndAUnit) {
   EXPECT_EQ(wanted_output("boom.tip").accuracy, 0);
   EXPECT_EQ(wanted_output("boom.tip 1e-3").accuracy, 1e-3);
   EXPECT_EQ(wanted_output("clamp.torque 2e-3 N m").unit, "N m");
-  for (const char* text : {"boom.tip ", "boom.tip x", "boom.tip 0", "boom.tip -1", "boom.tip nan", "boom.tip 1e-3 rad",
-                           "boom.tip 1e-3m", "boom.tip 1e-3 ", "boom.q 1e-3 m", "clamp.torque 1 N"})
+  for (const char* text :
+       {"boom.tip ", "boom.tip x", "boom.tip 0", "boom.tip -1", "boom.tip nan", "boom.tip 1e-3m", "boom.tip 1e-3 "})
     EXPECT_THROW(wanted_output(text), InputError) << text;
+}
+
+TEST(OutputErrors, AUnitMustBeThatOfTheOutput) {
+  const std::vector<std::string> outputs = {"hinge.angle", "hinge.rate", "slide.length", "slide.rate", "slide.drive"};
+  for (const char* text : {"boom.tip 1e-3 rad", "boom.q 1e-3 m", "clamp.torque 1 N", "hinge.rate 1 m/s",
+                           "slide.rate 1 rad/s", "slide.drive 1 N m", "hinge.drive 1 N"})
+    EXPECT_THROW(require_unit(wanted_output(text), outputs), InputError) << text;
+  for (const char* text : {"boom.tip 1e-3 m", "boom.q 1e-3", "hinge.rate 1 rad/s", "slide.rate 1 m/s",
+                           "slide.drive 1 N", "hinge.drive 1 N m"})
+    EXPECT_NO_THROW(require_unit(wanted_output(text), outputs)) << text;
 }
 
 TEST(OutputErrors, AbsoluteErrorsAreNumbersWithAUnit) {
@@ -132,13 +152,14 @@ TEST(OutputErrors, AbsoluteErrorsAreNumbersWithAUnit) {
 }
 
 TEST(OutputErrors, EveryUnitIsThatOfAnOutput) {
-  EXPECT_EQ(unit_of("hub.rotation"), "rad");
-  EXPECT_EQ(unit_of("boom.tip"), "m");
-  EXPECT_EQ(unit_of("slide.length"), "m");
-  EXPECT_EQ(unit_of("wheel.spin"), "rad/s");
-  EXPECT_EQ(unit_of("lvlh.roll"), "rad");
-  EXPECT_EQ(unit_of("boom.q"), "");
-  EXPECT_EQ(unit_of("hinge.drive"), "");
+  EXPECT_EQ(unit_of("hub.rotation", {}), "rad");
+  EXPECT_EQ(unit_of("boom.tip", {}), "m");
+  EXPECT_EQ(unit_of("slide.length", {}), "m");
+  EXPECT_EQ(unit_of("wheel.spin", {}), "rad/s");
+  EXPECT_EQ(unit_of("lvlh.roll", {}), "rad");
+  EXPECT_EQ(unit_of("boom.q", {}), "");
+  EXPECT_EQ(unit_of("hinge.drive", {}), "N m");
+  EXPECT_EQ(unit_of("universal.drive2", {}), "N m");
 }
 
 TEST(ErrorBudget, TotalIsThatOfTheWorstOutput) {
