@@ -119,7 +119,8 @@ class Laws {
   void latch(LawMotion&, Law&, double t);
   static bool has_latch_at(const Law&, const std::optional<StopLaw>& rigid_stop);
   bool is_captured(LawMotion&, Law&, double rebound) const;
-  void strike(LawMotion&, Law&, double new_rate, LawLoss);
+  bool is_momentary(const Law&, double speed, double towards) const;
+  void strike(LawMotion&, Law&, double new_rate, LawLoss, bool moves_others = true);
   void follow_rates(LawMotion&, double t);
 
   std::vector<Law> laws_;

@@ -132,12 +132,14 @@ void Laws::hit(LawMotion& motion, Law& law, double t) {
   if (is_caught(std::abs(rate))) return latch(motion, law, t);
   event(law, t, EventKind::impact, rate);
   law.has_left = false;
-  strike(motion, law, -restitution * rate, LawLoss::impact);
+  refresh(motion);
+  const bool moves_others = !is_momentary(law, std::abs(rate), end * motion.joint_acceleration(law.joint));
+  strike(motion, law, -restitution * rate, LawLoss::impact, moves_others);
   if (is_caught(rebound)) return latch(motion, law, t);
   if (rebound > still(law)) {
     follow_rates(motion, t);
     if (!is_captured(motion, law, rebound)) return;
-    strike(motion, law, 0, LawLoss::impact);
+    strike(motion, law, 0, LawLoss::impact, moves_others);
     if (has_latch) return latch(motion, law, t);
   }
   law.state.rests_at = end;
@@ -149,22 +151,30 @@ void Laws::hit(LawMotion& motion, Law& law, double t) {
 bool Laws::is_captured(LawMotion& motion, Law& law, double rebound) const {
   const double rate = motion.joint_way(law.joint).rate;
   const double towards = -motion.joint_acceleration(law.joint) * (rate > 0 ? 1 : -1);
+  return is_momentary(law, rebound, towards) || (towards > 0 && rebound < settle_ * law.largest_rate);
+}
+
+/// Is a joint at a rigid stop so slow, against the acceleration towards the stop, that it is there again at once, or
+/// does not come farther than its place is known?
+bool Laws::is_momentary(const Law& law, double speed, double towards) const {
   constexpr double at_once = 1e-9;  // [s]
-  const double height = rebound * rebound / (2 * std::max(towards, 1e-300));
+  const double height = speed * speed / (2 * std::max(towards, 1e-300));
   // What an error of a step makes of a place.
   const double open = std::max(0.1 * tolerance_ * law.largest_gap, 10 * round_off_);
-  return towards > 0 && (rebound < settle_ * law.largest_rate || 2 * rebound < at_once * towards || height < open);
+  return towards > 0 && (2 * speed < at_once * towards || height < open);
 }
 
 /// A blow along one joint that gives it a new rate. Friction is no match for it: what sticks slips; what rests at a
-/// stop leaves it where the stop would have to pull.
-void Laws::strike(LawMotion& motion, Law& law, double new_rate, LawLoss loss) {
+/// stop leaves it where the stop would have to pull. A momentary one moves no others: two joints that are pressed onto
+/// their stops would throw each other off them for ever.
+void Laws::strike(LawMotion& motion, Law& law, double new_rate, LawLoss loss, bool moves_others) {
   const double rate = motion.joint_way(law.joint).rate;
   if (rate == new_rate) return;
   const auto loosen = [&](Law& l) { l.state.motion = l.model.friction ? Motion::forward : Motion::free; };
   loosen(law);
   for (Law& other : laws_)
-    if (other.state.motion == Motion::held && !other.state.latched && other.state.rests_at == 0) loosen(other);
+    if (moves_others && other.state.motion == Motion::held && !other.state.latched && other.state.rests_at == 0)
+      loosen(other);
   for (std::size_t round = 0; round <= laws_.size(); ++round) {
     refresh(motion);
     motion.prepare_blow(law.joint);
@@ -174,7 +184,7 @@ void Laws::strike(LawMotion& motion, Law& law, double new_rate, LawLoss loss) {
              l.state.rests_at * sense * motion.hold_of_blow(l.joint) > 0;
     };
     const auto pulled = std::ranges::find_if(laws_, pulls);
-    if (pulled == laws_.end()) break;
+    if (pulled == laws_.end() || !moves_others) break;
     loosen(*pulled);
   }
   const double impulse = (new_rate - rate) / motion.rate_of_blow(law.joint);

@@ -14,13 +14,13 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// What a start says of the energies to come. It is the energy of the start. Where there is none, it is what its pushes
-/// begin with. Where nothing pushes yet but round-off, it is that of slow bodies. `time`: in which a push shows [s].
+/// What a start says of the energies to come. It is the energy of the start. Where there is none but round-off, it is
+/// what its pushes begin with. Where nothing pushes yet but round-off, it is that of slow bodies. `time`: in which a
+/// push shows [s].
 double energy_scale(const Equations& equations, double at_start, const VectorXd& y_dot, double time) {
   double inertia = 0;
   for (const ReducedBody& b : equations.scene().bodies) inertia += b.J0.trace();
   const double slow = slow_energy(inertia);
-  if (at_start > nothing * slow) return at_start;
   double begun = 0;
   for (size_t i = 0; i < equations.places().size(); ++i) {
     const BodyPlaces& at = equations.places()[i];
@@ -28,6 +28,8 @@ double energy_scale(const Equations& equations, double at_start, const VectorXd&
     begun += (b.m * y_dot.segment<3>(at.v).squaredNorm() + b.J0.trace() / 3 * y_dot.segment<3>(at.w).squaredNorm()) *
              time * time / 2;
   }
+  constexpr double round_off = 1e-9;  // of what is pushed: a preload times the round-off of a place is no energy
+  if (at_start > std::max(nothing * slow, round_off * begun)) return at_start;
   constexpr double hardly =
       1e-6;  // of what slow bodies have: beside gravity's gradient it is what comes later that counts
   return begun > nothing * slow ? std::max(begun, hardly * slow) : slow;

@@ -9,7 +9,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace flexboom {
@@ -158,6 +160,91 @@ TEST(LawScene, ALatchingPanelIsAsGoodAsItsTolerance) {
                 30 * tolerance)
           << method << tolerance;
   }
+}
+
+// Two panels that are pressed onto their rigid stops of a light hub, and rattle there. What one does last moves the
+// other.
+TEST(LawScene, TwoJointsComeToRestAtTheirStopsTogether) {
+  std::string text = R"(format = "flexboom-scene-1"
+name = "rattle"
+duration = 0.01
+output_step = 0.001
+[accuracy]
+tolerance = 1e-8
+budget = false
+[[bodies]]
+name = "hub"
+mass = 20.0
+inertia = [3.0, 2.0, 4.0]
+[[joints]]
+name = "flight"
+kind = "free"
+b = { body = "hub" }
+)";
+  for (const auto& [panel, side] : {std::pair("p", 1), std::pair("q", -1)})
+    text += fmt::format(R"([[bodies]]
+name = "{0}"
+modes = 2
+damping = {{ rule = "modal", value = 0.01 }}
+segments = [{{ shape = "rectangle", height = 0.01, width = 0.2, length = 1.0, material = {{ E = 7e9, nu = 0.33, rho = 700 }} }}]
+[[joints]]
+name = "hinge_{0}"
+kind = "hinge"
+a = {{ body = "hub", point = [{1}, 0.0, 0.0], x = [{2}, 0.0, 0.0], z = [0.0, 0.0, 1.0] }}
+b = {{ body = "{0}", marker = "root" }}
+start = 1.3
+start_rate = 0.5
+preload = -0.1
+upper_stop = {{ at = 1.3, restitution = 0.5 }}
+friction = {{ coulomb = 0.02, breakaway = 0.04 }}
+)",
+                        panel, 0.3 * side, side);
+  const auto events = [&](const char* formulation) {
+    std::string r;
+    for (const StopEvent& e : run(text, formulation).motion.events) r += fmt::format("{} {}\n", e.joint, event_name(e));
+    return r;
+  };
+  const std::string seen = events("relative");
+  EXPECT_LT(std::ranges::count(seen, '\n'), 100) << seen;
+  EXPECT_TRUE(seen.ends_with("rest\n")) << seen;
+  EXPECT_EQ(events("multipliers"), seen);
+}
+
+// The energy of a preload at the rest of its spring is round-off of the place times the preload.
+TEST(LawScene, APreloadSetsOffFromRest) {
+  const std::string text = R"(format = "flexboom-scene-1"
+name = "preload"
+duration = 0.2
+output_step = 0.02
+[accuracy]
+tolerance = 1e-7
+budget = false
+[[bodies]]
+name = "boom"
+modes = 2
+segments = [{ shape = "rectangle", height = 0.01, width = 0.2, length = 1.0, material = { E = 7e9, nu = 0.33, rho = 700 } }]
+[[bodies]]
+name = "hub"
+mass = 20.0
+inertia = [3.0, 2.0, 4.0]
+[[joints]]
+name = "turn"
+kind = "hinge"
+b = { body = "hub" }
+[[joints]]
+name = "slide"
+kind = "slider"
+a = { body = "hub", point = [0.3, 0.0, 0.0], x = [0.0, 1.0, 0.0], z = [1.0, 0.0, 0.0] }
+b = { body = "boom", marker = "root" }
+start = 0.05
+rest = 0.05
+stiffness = 40.0
+preload = 0.2
+)";
+  const OutputTable by_tree = run(text).outputs, by_multipliers = run(text, "multipliers").outputs;
+  const auto length = std::ranges::find(by_tree.names, "slide.length") - by_tree.names.begin();
+  EXPECT_GT(by_tree.values.col(length).maxCoeff(), 0.051);
+  EXPECT_LT((by_tree.values.col(length) - by_multipliers.values.col(length)).cwiseAbs().maxCoeff(), 1e-8);
 }
 
 TEST(LawScene, SummaryTellsWhereTheEnergyWent) {
