@@ -87,6 +87,7 @@ class TreeFlight final : public Flight<TreeTrajectory> {
       scales_.raise(scalar(i), contacts_.largest_gap(i));
     contacts_.begin(*this);
     laws_.begin(*this, t_, result_.events);
+    scales_.observe(y_);  // an impact at the start changes it at once
   }
 
  private:
