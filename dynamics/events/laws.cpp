@@ -159,7 +159,8 @@ void Laws::guess_state(Law& law, Gap way) {
   s = {};
   for (const LawRamp& r : m.ramps) {
     const double side = r.above ? 1 : -1, depth = side * (x - r.at);
-    s.beyond.push_back(depth > 0 || (depth == 0 && side * rate > 0));
+    const bool is_on = std::abs(depth) <= round_off_at(r.at);
+    s.beyond.push_back(is_on ? side * rate > 0 : depth > 0);
     s.pushes.push_back(s.beyond.back() && (r.damping == 0 || r.slope * depth + r.damping * side * rate > 0));
   }
   for (const LawRamp& r : m.rate_ramps) s.faster.push_back(rate > r.at);
@@ -175,10 +176,25 @@ void Laws::guess_state(Law& law, Gap way) {
   if (s.rests_at != 0 || (m.friction && rests)) s.motion = Motion::held;
 }
 
+/// What starts at rest on the place of a ramp is on the side where its push takes it.
+void Laws::go_where_pushed(LawMotion& motion, Law& law) {
+  LawState& s = law.state;
+  if (s.motion == Motion::held) return;
+  const Gap way = motion.joint_way(law.joint);
+  for (std::size_t k = 0; k < law.model.ramps.size(); ++k) {
+    const LawRamp& r = law.model.ramps[k];
+    if (std::abs(way.value - r.at) > round_off_at(r.at)) continue;
+    motion.put(law.joint, r.at);
+    if (std::abs(way.rate) > still(law)) continue;
+    s.beyond[k] = s.pushes[k] = (r.above ? 1 : -1) * motion.joint_acceleration(law.joint) > 0;
+    refresh(motion);
+  }
+}
+
 void Laws::begin(LawMotion& motion, double t, std::vector<StopEvent>& events) {
   if (empty()) return;
   events_ = &events;
-  std::vector<char> latches(laws_.size(), 0);
+  std::vector<char> guessed(laws_.size(), 0), latches(laws_.size(), 0);
   for (std::size_t i = 0; i < laws_.size(); ++i) {
     Law& law = laws_[i];
     const Gap way = motion.joint_way(law.joint);
@@ -187,10 +203,13 @@ void Laws::begin(LawMotion& motion, double t, std::vector<StopEvent>& events) {
     law.largest_gap = std::max(law.largest_gap, std::abs(way.value));
     if (goes_on) continue;
     guess_state(law, way);
+    guessed[i] = 1;
     latches[i] = law.state.latched;
     law.state.latched = false;
   }
   refresh(motion);
+  for (std::size_t i = 0; i < laws_.size(); ++i)
+    if (guessed[i]) go_where_pushed(motion, laws_[i]);
   for (std::size_t i = 0; i < laws_.size(); ++i) {
     Law& law = laws_[i];
     const Gap way = motion.joint_way(law.joint);

@@ -103,6 +103,7 @@ class Laws {
 
   void add_switches(std::size_t law);
   void guess_state(Law&, Gap);
+  void go_where_pushed(LawMotion&, Law&);
   void refresh(LawMotion&);
   void arm();
   double still(const Law&) const;
@@ -120,7 +121,7 @@ class Laws {
   static bool has_latch_at(const Law&, const std::optional<StopLaw>& rigid_stop);
   bool is_captured(LawMotion&, Law&, double rebound) const;
   bool is_momentary(const Law&, double speed, double towards) const;
-  void strike(LawMotion&, Law&, double new_rate, LawLoss, bool moves_others = true);
+  void strike(LawMotion&, Law&, double new_rate, LawLoss, bool frees_others = true);
   void follow_rates(LawMotion&, double t);
 
   std::vector<Law> laws_;

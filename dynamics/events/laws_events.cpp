@@ -133,13 +133,13 @@ void Laws::hit(LawMotion& motion, Law& law, double t) {
   event(law, t, EventKind::impact, rate);
   law.has_left = false;
   refresh(motion);
-  const bool moves_others = !is_momentary(law, std::abs(rate), end * motion.joint_acceleration(law.joint));
-  strike(motion, law, -restitution * rate, LawLoss::impact, moves_others);
+  const bool frees_others = !is_momentary(law, std::abs(rate), end * motion.joint_acceleration(law.joint));
+  strike(motion, law, -restitution * rate, LawLoss::impact, frees_others);
   if (is_caught(rebound)) return latch(motion, law, t);
   if (rebound > still(law)) {
     follow_rates(motion, t);
     if (!is_captured(motion, law, rebound)) return;
-    strike(motion, law, 0, LawLoss::impact, moves_others);
+    strike(motion, law, 0, LawLoss::impact, false);  // a part of the first is taken back
     if (has_latch) return latch(motion, law, t);
   }
   law.state.rests_at = end;
@@ -154,8 +154,8 @@ bool Laws::is_captured(LawMotion& motion, Law& law, double rebound) const {
   return is_momentary(law, rebound, towards) || (towards > 0 && rebound < settle_ * law.largest_rate);
 }
 
-/// Is a joint at a rigid stop so slow, against the acceleration towards the stop, that it is there again at once, or
-/// does not come farther than its place is known?
+/// Is a joint at a rigid stop so slow, against the acceleration towards the stop, that it is there again at once? Or
+/// does it come no farther than its place is known?
 bool Laws::is_momentary(const Law& law, double speed, double towards) const {
   constexpr double at_once = 1e-9;  // [s]
   const double height = speed * speed / (2 * std::max(towards, 1e-300));
@@ -165,26 +165,27 @@ bool Laws::is_momentary(const Law& law, double speed, double towards) const {
 }
 
 /// A blow along one joint that gives it a new rate. Friction is no match for it: what sticks slips; what rests at a
-/// stop leaves it where the stop would have to pull. A momentary one moves no others: two joints that are pressed onto
-/// their stops would throw each other off them for ever.
-void Laws::strike(LawMotion& motion, Law& law, double new_rate, LawLoss loss, bool moves_others) {
+/// stop leaves it where the stop would have to pull. A momentary one frees none of these: two joints that are
+/// pressed onto their stops would throw each other off them for ever.
+void Laws::strike(LawMotion& motion, Law& law, double new_rate, LawLoss loss, bool frees_others) {
   const double rate = motion.joint_way(law.joint).rate;
   if (rate == new_rate) return;
   const auto loosen = [&](Law& l) { l.state.motion = l.model.friction ? Motion::forward : Motion::free; };
   loosen(law);
   for (Law& other : laws_)
-    if (moves_others && other.state.motion == Motion::held && !other.state.latched && other.state.rests_at == 0)
+    if (frees_others && other.state.motion == Motion::held && !other.state.latched && other.state.rests_at == 0)
       loosen(other);
   for (std::size_t round = 0; round <= laws_.size(); ++round) {
     refresh(motion);
     motion.prepare_blow(law.joint);
+    if (!frees_others) break;
     const double sense = new_rate > rate ? 1 : -1;
     const auto pulls = [&](const Law& l) {
       return l.state.motion == Motion::held && !l.state.latched &&
              l.state.rests_at * sense * motion.hold_of_blow(l.joint) > 0;
     };
     const auto pulled = std::ranges::find_if(laws_, pulls);
-    if (pulled == laws_.end() || !moves_others) break;
+    if (pulled == laws_.end()) break;
     loosen(*pulled);
   }
   const double impulse = (new_rate - rate) / motion.rate_of_blow(law.joint);

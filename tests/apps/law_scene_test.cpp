@@ -216,6 +216,57 @@ friction = {{ coulomb = 0.02, breakaway = 0.04 }}
   EXPECT_GT(more.size(), seen.size());
 }
 
+TEST(LawScene, AStartOnAPadIsNoEvent) {
+  for (const double rate : {-0.3, 0.0})
+    for (const double preload : {-0.3, 0.3}) {
+      const std::string text = fmt::format(R"(format = "flexboom-scene-1"
+name = "pad"
+duration = 1.0
+output_step = 0.05
+[accuracy]
+tolerance = 1e-9
+budget = false
+[[bodies]]
+name = "hub"
+mass = 1.0
+inertia = [0.3, 0.4, 0.5]
+[[bodies]]
+name = "panel"
+mass = 2.0
+inertia = [0.01, 0.2, 0.2]
+centre = [0.5, 0.0, 0.0]
+[[joints]]
+name = "flight"
+kind = "free"
+b = {{ body = "hub" }}
+[[joints]]
+name = "hinge"
+kind = "hinge"
+a = {{ body = "hub", point = [0.3, 0.0, 0.0] }}
+b = {{ body = "panel" }}
+start = -0.1
+start_rate = {}
+preload = {}
+lower_stop = {{ at = -0.1, stiffness = 50.0, damping = 1.0 }}
+)",
+                                           rate, preload);
+      SCOPED_TRACE(fmt::format("rate {}, preload {}", rate, preload));
+      const auto times = [&](const char* formulation) {
+        std::vector<double> r;
+        for (const StopEvent& e : run(text, formulation).motion.events) r.push_back(e.time);
+        return r;
+      };
+      const std::vector<double> seen = times("relative"), by_multipliers = times("multipliers");
+      EXPECT_EQ(seen.empty(), rate == 0);  // pressed onto it, or off it for good
+      ASSERT_EQ(seen.size(), by_multipliers.size());
+      for (size_t i = 0; i < seen.size(); ++i) {
+        EXPECT_GT(seen[i], 1e-3);
+        EXPECT_NEAR(seen[i], by_multipliers[i], 1e-8);
+      }
+    }
+}
+
+// The energy of a preload at the rest of its spring is round-off of the place times the preload.
 TEST(LawScene, APreloadSetsOffFromRest) {
   const std::string text = R"(format = "flexboom-scene-1"
 name = "preload"
