@@ -148,7 +148,7 @@ MotionRecord::MotionRecord(const Scene& flown, const SimulatedMotion& run, const
   RunHooks hooks = given;
   const double length = step * static_cast<double>(samples_);
   std::vector<double> at = rows_at(after_quiet(beginnings(scene_, run), most_beginnings), length, duration);
-  if (length * static_cast<double>(at.size()) < duration / 2)
+  if (!at.empty() && length * static_cast<double>(at.size()) < duration / 2)
     hooks.close_looks = {std::move(at), samples_ + 1, step};
   else
     scene_.output_step = std::min(step, duration / static_cast<double>(samples_));

@@ -272,6 +272,7 @@ std::vector<ShakenMode> MotionSpectra::shaken_beyond(const ReducedBody& all, dou
   if (!(fastest() > slowest)) return {};
   const MotionRecord& record = this->record(slowest);
   const MotionRecord::Driven driven = record.driven(all);
+  if (driven.signals.empty()) return {};
   const Sizes sizes = sizes_of(all.name, record);
   const Deflection deflection(all);
   const double step = std::numbers::pi / (static_cast<double>(record.samples()) * record.step());

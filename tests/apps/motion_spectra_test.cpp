@@ -124,6 +124,16 @@ TEST(MotionSpectra, HearWhatAPulseSetsOff) {
   EXPECT_TRUE(any_counts(shaken_modes(plucked), 1e-2));
 }
 
+// A run of ten periods of the tone, with few outputs.
+TEST(MotionSpectra, HearAToneInAShortRun) {
+  Scene scene = parse_scene(boom_on_hub + sprung_mass(clamped_frequency(10), 1e-4), "shaken.toml");
+  scene.duration = 20 * std::numbers::pi / clamped_frequency(10), scene.output_step = scene.duration / 10;
+  scene.error_budget = false;
+  const RunResult r = run_scene(scene, {});
+  const ShakenModes shaken = shaken_modes(scene, {}, {}, MotionSpectra(scene, r, {}), {});
+  EXPECT_TRUE(any_counts(shaken, 1e-2));
+}
+
 // They are those of the equations: a mass on a spring beside a heavy hub, and twice the rate of a rotor.
 TEST(MotionSpectra, KnowTheFastestVibrationAndTurn) {
   const auto fastest = [](const std::string& shaker) {
