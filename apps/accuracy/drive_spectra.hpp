@@ -25,8 +25,9 @@ class DriveSpectra {
 
   bool empty() const { return spectra_.empty(); }
 
-  /// The highest frequency beyond `shown` at which a drive moves modes by more than those up to there let expect, and
-  /// by more than a tenth of the tolerance of what it moves below [rad/s]. 0: none. `lowest`: of the body [rad/s].
+  /// The highest frequency beyond `shown` at which a drive moves modes by more than those up to there let expect
+  /// [rad/s]. It must move them by more than a tenth of the tolerance of what it moves below, too. 0: none. `lowest`:
+  /// of the body [rad/s].
   double fastest_beyond(double lowest, double shown) const;
 
  private:

@@ -12,6 +12,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,7 +53,7 @@ Finding discretisation_of(const Scene& scene, const Run& run, const Scene& flown
   return {m.repeats.change(run, flown, m.budget.time, next.steps), next.error_per_change};
 }
 
-/// Of the error of time: other parts come beside it.
+/// What the error of time may be: a third of the tolerance, for other parts come beside it.
 Settling settling_of(const Scene& scene) { return {scene.tolerance / 3, 2, bearable_balance(scene.tolerance)}; }
 
 /// Of a run, from repeats of it. `digits`: what is said of those that its integrator gets.

@@ -4,7 +4,6 @@
 #include "apps/accuracy/output_errors.hpp"
 #include "apps/simulate/simulate.hpp"
 
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,7 +15,7 @@ namespace flexboom {
 /// switched on. Geometric stiffness couples kinds of modes that are independent without it. Where the scene asks for
 /// multipliers or a method of its own, repeats are those of by_cheapest_means. Errors of time are then differences from
 /// by_cheapest_means.
-/// @throws InputError, NumericalError as run_scene.
+/// Where a repeat fails, its part is unknown, and the budget says why. @throws InputError, NumericalError as run_once.
 ErrorBudget measure_budget(Scene&, Run& run, const RunHooks&, std::vector<std::string>& plan,
                            const StillKinds& still = {});
 

@@ -18,14 +18,14 @@ namespace flexboom {
 
 namespace {
 
-/// All that the scene leaves to the program.
+/// With all geometric stiffness that the scene leaves to the program.
 Scene with_stiffening_left_open(const Scene& scene, Scene flown) {
   for (size_t i = 0; i < scene.bodies.size(); ++i)
     if (scene.bodies[i].stiffening == "auto") flown.bodies[i].stiffening = "on";
   return flown;
 }
 
-/// Is there any that is off?
+/// Is any of it off?
 bool any_open_stiffening(const Scene& scene, const Scene& flown) {
   for (size_t i = 0; i < scene.bodies.size(); ++i)
     if (scene.bodies[i].stiffening == "auto" && flown.bodies[i].stiffening == "off") return true;

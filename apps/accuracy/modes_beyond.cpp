@@ -259,7 +259,7 @@ Scene with_more_modes(Scene scene, const ModesBeyond& more, const Reach& reach_o
 void require_drives_shown(const Scene& scene, const DriveSpectra& drives, const RunHooks& hooks) {
   if (drives.empty()) return;
   for (const BodyScene& b : scene.bodies) {
-    if (b.rigid || b.structure == "rigid") continue;
+    if (!is_elastic(b)) continue;
     const Span span = span_of(b, scene.bodies_kept_in, hooks);
     const double tone = span.wanted(drives) / beyond_a_tone;
     if (tone > 0)

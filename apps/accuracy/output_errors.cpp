@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -96,7 +95,7 @@ double bearable(const WantedOutput& as, std::string_view unit, double size_of_ou
 std::vector<OutputDifference> compare_outputs(const OutputTable& a, const OutputTable& b,
                                               const std::vector<std::string>& wanted, const OutputFloors& floors) {
   std::vector<WantedOutput> asked, order;
-  std::ranges::transform(wanted, std::back_inserter(asked), wanted_output);
+  for (const std::string& text : wanted) asked.push_back(wanted_output(text));
   std::map<std::string, std::pair<ColumnPlaces, ColumnPlaces>> columns;
   Index time = -1;
   for (size_t i = 0; i < a.names.size(); ++i) {

@@ -11,7 +11,6 @@
 #include "apps/simulate/flights_ahead.hpp"
 #include "apps/simulate/steady_motion.hpp"
 #include "apps/simulate/tree_flight.hpp"
-#include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 
 #include <fmt/format.h>
@@ -20,6 +19,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <string_view>
 #include <utility>
 
 namespace flexboom {

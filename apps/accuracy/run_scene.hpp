@@ -21,7 +21,8 @@ struct RunResult : SimulatedMotion {
   double budget_seconds = 0;
 };
 
-/// The whole chain. `so_far`: told of the run itself as RunHooks::checkpoint, not of its repeats.
+/// Plan, flight, error budget, better plan, warnings. `so_far`: told of the run itself as RunHooks::checkpoint, not of
+/// its repeats.
 /// @throws InputError, NumericalError.
 RunResult run_scene(const Scene&, const RunHooks&,
                     const std::function<void(const RunResult& so_far, size_t first)>& so_far = {});

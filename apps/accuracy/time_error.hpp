@@ -20,7 +20,7 @@ struct Settling {
 /// that are right for the outputs may leave powers out. `run` is then the last but one. `flown` has the tolerance of
 /// its integrator, and `plan` says so. Returns the last differences. `reference`: a run of the same model that is more
 /// precise. It takes the place of the tighter ones, and `run` is the last.
-/// @throws InputError, NumericalError as run_scene.
+/// @throws InputError, NumericalError as run_once.
 std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors&, Settling, const RunHooks&,
                                                 std::vector<std::string>& plan, const Run* reference = nullptr);
 

@@ -3,7 +3,6 @@
 #include "apps/accuracy/drive_spectra.hpp"
 #include "apps/accuracy/motion_spectra.hpp"
 #include "apps/accuracy/variants.hpp"
-#include "apps/model/prepared_body.hpp"
 #include "apps/model/static_shapes.hpp"
 #include "apps/simulate/flights_ahead.hpp"
 #include "fem/base/check.hpp"
@@ -12,7 +11,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <functional>
+#include <cmath>
 #include <utility>
 
 namespace flexboom {
@@ -39,7 +38,7 @@ bool is_rate_of_joint(const std::string& output, const std::vector<JointScene>& 
   });
 }
 
-/// Where tones make modes go on, elements are finer.
+/// The scene as flown with the elements of `richer`, of beams that tones give a reach. Nothing: there are none.
 std::optional<Scene> with_elements_of(const Scene& richer, const ErrorBudget& budget, Scene flown) {
   bool any = false;
   for (size_t i = 0; i < flown.bodies.size(); ++i) {
@@ -51,12 +50,12 @@ std::optional<Scene> with_elements_of(const Scene& richer, const ErrorBudget& bu
   return any ? std::optional(std::move(flown)) : std::nullopt;
 }
 
-/// Loads converge slowly.
+/// How many modes beyond show the truncation: as many as are kept where loads are outputs, for these converge slowly.
 ModesBeyond number_beyond(const ErrorBudget& budget) {
   return {.as_many = std::ranges::any_of(budget.outputs, is_load, &OutputErrors::name)};
 }
 
-/// Of the body where they are most.
+/// All modes by those beyond, of the body where that is most.
 double modes_by_modes_beyond(const Scene& flown, const Scene& richer) {
   const auto modes = [](const BodyScene& b) {
     return b.reduced ? b.reduced->n() : b.shapes.empty() ? b.modes : static_cast<int>(std::ssize(b.shapes));

@@ -63,8 +63,7 @@ void check_accuracy(Faults& faults, const Scene& scene) {
   for (const std::string& text : scene.outputs) {
     WantedOutput wanted;
     try {
-      wanted = wanted_output(text);
-      require_unit(wanted, known);
+      wanted = wanted_output(text, known);
     } catch (const InputError& e) {
       faults.add("accuracy.outputs", e.what());
       continue;

@@ -42,13 +42,15 @@ WantedOutput wanted_output(const std::string& text) {
   return r;
 }
 
-void require_unit(const WantedOutput& wanted, const std::vector<std::string>& outputs) {
-  const std::string_view unit = unit_of(wanted.name, outputs);
-  require(wanted.unit.empty() || wanted.unit == unit,
-          unit.empty() ? fmt::format("has {0} in {1}, but {0} is no output that has a unit; give a relative error, or "
+WantedOutput wanted_output(const std::string& text, const std::vector<std::string>& outputs) {
+  WantedOutput r = wanted_output(text);
+  const std::string_view unit = unit_of(r.name, outputs);
+  require(r.unit.empty() || r.unit == unit,
+          unit.empty() ? fmt::format("is '{}', but {} is no output that has a unit; give a relative error, or "
                                      "check the name",
-                                     wanted.name, wanted.unit)
-                       : fmt::format("has {0} in {1}, but {0} is in {2}", wanted.name, wanted.unit, unit));
+                                     text, r.name)
+                       : fmt::format("is '{}', but {} is in {}", text, r.name, unit));
+  return r;
 }
 
 std::string_view unit_of(const std::string& output, const std::vector<std::string>& outputs) {

@@ -27,8 +27,8 @@ struct WantedOutput {
 /// @throws InputError for anything else.
 WantedOutput wanted_output(const std::string& text);
 
-/// @throws InputError where it has a unit that is not that of the output. `outputs`: as unit_of.
-void require_unit(const WantedOutput&, const std::vector<std::string>& outputs);
+/// The same, and its unit is that of the output. `outputs`: as unit_of. @throws InputError, where it is not, too.
+WantedOutput wanted_output(const std::string& text, const std::vector<std::string>& outputs);
 
 /// Is this output one of those that are named? @throws InputError as wanted_output.
 bool names_output(const std::vector<std::string>& wanted, const std::string& output);

@@ -34,7 +34,8 @@ bool is_coordinate(const std::string& column) { return output_of_column(column).
 bool is_pointing(const std::string& output) { return output.ends_with(".pointing") || output.starts_with("lvlh."); }
 
 bool is_load(const std::string& output) {
-  return output.ends_with(".force") || output.ends_with(".torque") || output.ends_with(".drive");
+  const std::string what = last_word(output);
+  return what == "force" || what == "torque" || what.starts_with("drive");
 }
 
 Eigen::MatrixXd coordinates_of(const OutputTable& outputs, const ReducedBody& body) {

@@ -5,7 +5,6 @@
 #include "apps/simulate/multipliers_flight.hpp"
 #include "apps/simulate/steady_motion.hpp"
 #include "apps/simulate/tree_flight.hpp"
-#include "fem/base/check.hpp"
 #include "fem/base/stopwatch.hpp"
 
 #include <fmt/format.h>
@@ -15,9 +14,6 @@
 
 namespace flexboom {
 
-using Eigen::Matrix3d;
-using Eigen::MatrixXd;
-using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
@@ -66,7 +62,7 @@ FlightState end_of(const std::vector<PreparedBody>& bodies, double time, const V
 
 namespace {
 
-/// Over the outputs, of long lists over some.
+/// How far each body bends, over at most `most_deflections` rows.
 std::vector<Bending> bending_of(const Run& run) {
   std::vector<Bending> bending;
   const Eigen::Index stride = run.outputs.values.rows() / most_deflections + 1;
