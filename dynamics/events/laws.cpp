@@ -13,6 +13,9 @@ constexpr double place_round_off = 1e-14;  // of an angle, in radians or of its 
 
 double round_off_at(double place) { return place_round_off * std::max(1.0, std::abs(place)); }
 
+/// Is x that place, but for round-off?
+bool is_at(double place, double x) { return std::abs(x - place) <= round_off_at(place); }
+
 }  // namespace
 
 Laws::Laws(const std::vector<Joint>& joints, const FlightOptions& options, double round_off)
@@ -96,7 +99,7 @@ Gap Laws::gap(const LawSwitch& s, const LawPoint& p) const {
 
 bool Laws::has_latch_at(const Law& law, const std::optional<StopLaw>& rigid_stop) {
   const auto& latch = law.model.latch;
-  return latch && rigid_stop && std::abs(latch->at - rigid_stop->at) <= round_off_at(latch->at);
+  return latch && rigid_stop && is_at(latch->at, rigid_stop->at);
 }
 
 /// A rate that is none: the start of a motion may be wrong by so much, and a rate between two bodies by its round-off.
@@ -159,15 +162,14 @@ void Laws::guess_state(Law& law, Gap way) {
   s = {};
   for (const LawRamp& r : m.ramps) {
     const double side = r.above ? 1 : -1, depth = side * (x - r.at);
-    const bool is_on = std::abs(depth) <= round_off_at(r.at);
-    s.beyond.push_back(is_on ? side * rate > 0 : depth > 0);
+    s.beyond.push_back(is_at(r.at, x) ? side * rate > 0 : depth > 0);
     s.pushes.push_back(s.beyond.back() && (r.damping == 0 || r.slope * depth + r.damping * side * rate > 0));
   }
   for (const LawRamp& r : m.rate_ramps) s.faster.push_back(rate > r.at);
   if (m.latch) {
     const double beyond = x - m.latch->at;
     s.past_latch = beyond > 0 || (beyond == 0 && rate > 0);
-    s.latched = std::abs(beyond) <= round_off_at(m.latch->at) && std::abs(rate) <= m.latch->rate;
+    s.latched = is_at(m.latch->at, x) && std::abs(rate) <= m.latch->rate;
   }
   const bool rests = std::abs(rate) <= still(law);
   if (m.upper && x >= m.upper->at - round_off_at(m.upper->at) && rests) s.rests_at = 1;
@@ -183,7 +185,7 @@ void Laws::go_where_pushed(LawMotion& motion, Law& law) {
   const Gap way = motion.joint_way(law.joint);
   for (std::size_t k = 0; k < law.model.ramps.size(); ++k) {
     const LawRamp& r = law.model.ramps[k];
-    if (std::abs(way.value - r.at) > round_off_at(r.at)) continue;
+    if (!is_at(r.at, way.value)) continue;
     motion.put(law.joint, r.at);
     if (std::abs(way.rate) > still(law)) continue;
     s.beyond[k] = s.pushes[k] = (r.above ? 1 : -1) * motion.joint_acceleration(law.joint) > 0;
