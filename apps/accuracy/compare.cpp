@@ -108,7 +108,7 @@ VectorXd frequencies_hz(const BodyScene& b, int count, int elements) {
 }  // namespace
 
 std::string not_comparable(const BodyScene& b) {
-  if (!b.is_boom() || b.structure == "rigid") return fmt::format("body {}: it is no flexible boom", b.name);
+  if (!b.is_boom() || !b.is_flexible()) return fmt::format("body {}: it is no flexible boom", b.name);
   try {
     uniform_boom(b);
   } catch (const InputError& e) {

@@ -33,8 +33,7 @@ bool any_open_stiffening(const Scene& scene, const Scene& flown) {
 }
 
 bool all_stiffening_is_on(const Scene& scene) {
-  return std::ranges::all_of(
-      scene.bodies, [](const BodyScene& b) { return b.rigid || b.structure == "rigid" || b.stiffening == "on"; });
+  return std::ranges::all_of(scene.bodies, [](const BodyScene& b) { return !b.is_flexible() || b.stiffening == "on"; });
 }
 
 bool leaves_stiffening_out(const Run& run) {

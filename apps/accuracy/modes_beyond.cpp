@@ -16,7 +16,7 @@ namespace flexboom {
 
 namespace {
 
-constexpr int most_beyond = 64, most_for_tones = 96;  // modes of a body
+constexpr int most_beyond = 64, most_for_tones = 128;  // modes of a body
 
 /// Of the modes of a body, in their order [rad/s].
 std::vector<double> frequencies(const PreparedBody& p) {
@@ -68,6 +68,12 @@ std::vector<int> places_of(const BodyScene& b, const PreparedBody& whole, const 
   return places;
 }
 
+/// So many modes at least go up to a frequency where the first `modes` go up to another. In no kind are there fewer
+/// modes of higher frequencies than in bending, where these rise with the square of their number.
+int modes_up_to(double reach, int modes, double highest) {
+  return highest > 0 && highest < reach ? static_cast<int>(modes * std::sqrt(reach / highest)) : modes;
+}
+
 /// The lowest modes of all directions: the `highest` that is kept, and enough beyond those of each kind in `kinds`.
 /// Those of beams go on until some stretch and some twist; where none do, static shapes stand for them. They go on to
 /// the frequency `reach`, too. What lies beyond `resolved` the elements do not know.
@@ -76,20 +82,21 @@ BodyScene with_modes_beyond(BodyScene b, int highest, int resolved, const ModesB
                             const RunHooks& hooks) {
   b.shapes.clear();
   b.directions = "all";
-  for (int i = 1;; i *= 2) {
-    const int wanted = std::max(highest, std::min(highest + 2 * i * more.of(0), resolved));
+  const int most = reach > 0 ? most_for_tones : most_beyond;
+  for (int beside = 2 * more.of(0);;) {
+    const int wanted = std::max(highest, std::min(highest + beside, resolved));
     b = with_modes(std::move(b), wanted, keep, hooks);
     const PreparedBody all = prepared(b, 0, keep, hooks);
     std::map<std::string, int> count = kinds_of(all);
     const std::vector<double> w = frequencies(all);
-    const bool enough =
-        (reach == 0 || (!w.empty() && std::ranges::max(w) >= reach)) &&
-        std::ranges::all_of(kinds, [&](const auto& k) { return count[k.first] >= k.second + more.of(k.second); });
+    const double last = w.empty() ? 0 : std::ranges::max(w);
+    const bool enough = last >= reach && std::ranges::all_of(kinds, [&](const auto& k) {
+                          return count[k.first] >= k.second + more.of(k.second);
+                        });
     const std::vector<std::string> statics = static_shapes_beside(all.body, b.clamp);
-    const bool has_more =
-        b.modes == wanted && wanted < std::min(highest + (reach > 0 ? most_for_tones : most_beyond), resolved);
-    if (has_more && (!enough || (b.structure == "beam" && !statics.empty()))) continue;
-    return with_static_shapes(b, statics);
+    const bool has_more = b.modes == wanted && wanted < std::min(highest + most, resolved);
+    if (!has_more || (enough && (b.structure != "beam" || statics.empty()))) return with_static_shapes(b, statics);
+    beside = std::min(std::max(2 * beside, modes_up_to(reach, b.modes, last) - highest), most);
   }
 }
 
@@ -149,10 +156,10 @@ BodyScene with_more_of_whole(const BodyScene& b, const ModesBeyond& more, double
   richer.directions = "all";
   richer.shapes.clear();
   for (int beside = more.of(per_plane);; beside *= 2) {
-    richer.modes = 2 * (per_plane + beside);
+    const int wanted = richer.modes = 2 * (per_plane + beside);
     if (reach == 0) return richer;
-    richer = with_modes(std::move(richer), richer.modes, keep, hooks);
-    const bool is_last = richer.modes < 2 * (per_plane + beside) || 2 * beside >= most_for_tones;
+    richer = with_modes(std::move(richer), wanted, keep, hooks);
+    const bool is_last = richer.modes < wanted || 2 * beside >= most_for_tones;
     if (is_last || std::ranges::max(frequencies(prepared(richer, 0, keep, hooks))) >= reach) return richer;
   }
 }
@@ -196,8 +203,6 @@ BodyScene with_modes_of_its_file(BodyScene b) {
   return b;
 }
 
-bool is_elastic(const BodyScene& b) { return !b.rigid && b.structure != "rigid"; }
-
 /// 0: it has none.
 double reach_of(const BodyScene& b, const Reach& reach) {
   const auto of_body = reach.find(b.name);
@@ -210,7 +215,7 @@ Reach reach_of_drives(const Scene& scene, const ModesBeyond& more, const DriveSp
   Reach reach;
   if (drives.empty()) return reach;
   for (const BodyScene& b : scene.bodies) {
-    if (!is_elastic(b) || !b.is_boom()) continue;
+    if (!b.is_flexible() || !b.is_boom()) continue;
     const BodyScene shown = with_more_modes(b, more, 0, scene.bodies_kept_in, hooks);
     if (const double wanted = span_of(shown, scene.bodies_kept_in, hooks).wanted(drives); wanted > 0)
       reach[b.name] = wanted;
@@ -218,18 +223,28 @@ Reach reach_of_drives(const Scene& scene, const ModesBeyond& more, const DriveSp
   return reach;
 }
 
-ShakenModes shaken_modes(const Scene& scene, const ModesBeyond& more, const Reach& reach, const MotionSpectra& motion,
+ShakenModes shaken_modes(const Scene& flown, const SimulatedMotion& run, const ModesBeyond& more, const Reach& reach,
                          const RunHooks& hooks) {
+  const double all = beyond_a_tone * fastest_motion(run);
+  const auto richer = [&](const BodyScene& b, double to) {
+    return b.is_boom() ? with_more_modes(b, more, to, flown.bodies_kept_in, hooks) : with_modes_of_its_file(b);
+  };
+  std::map<std::string, double> shown;  // up to which frequency, of bodies that have modes beyond [rad/s]
+  double lowest = all;
+  for (const BodyScene& b : flown.bodies) {
+    if (!b.is_flexible()) continue;
+    const double highest = span_of(richer(b, reach_of(b, reach)), flown.bodies_kept_in, hooks).highest;
+    if (highest > 0 && highest < all) shown[b.name] = highest, lowest = std::min(lowest, highest);
+  }
+  if (shown.empty()) return {};
+  const MotionSpectra motion(flown, run, lowest / beyond_a_tone, hooks);
   ShakenModes shaken;
-  for (const BodyScene& b : scene.bodies) {
-    if (!is_elastic(b)) continue;
-    const auto richer = [&](double to) {
-      return b.is_boom() ? with_more_modes(b, more, to, scene.bodies_kept_in, hooks) : with_modes_of_its_file(b);
-    };
-    const BodyScene shown = richer(reach_of(b, reach));
-    const double highest = span_of(shown, scene.bodies_kept_in, hooks).highest, all = beyond_a_tone * motion.fastest();
-    if (!(highest > 0 && all > highest)) continue;
-    shaken[b.name] = motion.shaken_beyond(prepared(richer(all), 0, scene.bodies_kept_in, hooks).body, highest);
+  for (BodyScene b : flown.bodies) {
+    const auto highest = shown.find(b.name);
+    if (highest == shown.end()) continue;
+    b.stiffening.clear();  // it is not flown
+    shaken[b.name] =
+        motion.shaken_beyond(prepared(richer(b, all), 0, flown.bodies_kept_in, hooks).body, highest->second);
   }
   return shaken;
 }
@@ -247,7 +262,7 @@ Reach with_shaken(Reach reach, const ShakenModes& shaken, double least) {
 Scene with_more_modes(Scene scene, const ModesBeyond& more, const Reach& reach_of_bodies, const RunHooks& hooks) {
   for (BodyScene& b : scene.bodies) {
     b = with_modes_of_its_file(std::move(b));
-    if (b.structure == "rigid" || !b.is_boom()) continue;
+    if (!b.is_flexible() || !b.is_boom()) continue;
     const double reach = reach_of(b, reach_of_bodies);
     if (reach > 0 && b.structure == "beam") b.geometry = refined(b.geometry, 2);  // a resonance needs its frequency
     b = with_more_modes(b, more, reach, scene.bodies_kept_in, hooks);
@@ -259,7 +274,7 @@ Scene with_more_modes(Scene scene, const ModesBeyond& more, const Reach& reach_o
 void require_drives_shown(const Scene& scene, const DriveSpectra& drives, const RunHooks& hooks) {
   if (drives.empty()) return;
   for (const BodyScene& b : scene.bodies) {
-    if (!is_elastic(b)) continue;
+    if (!b.is_flexible()) continue;
     const Span span = span_of(b, scene.bodies_kept_in, hooks);
     const double tone = span.wanted(drives) / beyond_a_tone;
     if (tone > 0)

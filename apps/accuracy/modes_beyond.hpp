@@ -48,9 +48,10 @@ Reach reach_of_drives(const Scene&, const ModesBeyond&, const DriveSpectra&, con
 /// Modes by the names of bodies.
 using ShakenModes = std::map<std::string, std::vector<ShakenMode>>;
 
-/// What the motion of a run does to modes beyond those. @throws InputError, NumericalError as prepare_body and
-/// MotionSpectra.
-ShakenModes shaken_modes(const Scene&, const ModesBeyond&, const Reach&, const MotionSpectra&, const RunHooks&);
+/// What the motion of a run does to modes beyond those. `flown`: the scene as it was flown. @throws InputError,
+/// NumericalError as prepare_body and MotionSpectra.
+ShakenModes shaken_modes(const Scene& flown, const SimulatedMotion& run, const ModesBeyond&, const Reach&,
+                         const RunHooks&);
 
 /// A mode is worth taking in where its effect is so much of the tolerance.
 inline constexpr double counting_effect = 0.1;

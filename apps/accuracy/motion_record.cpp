@@ -135,7 +135,7 @@ Vector6 acceleration(const PlaceMotionInSpace& before, const PlaceMotionInSpace&
 
 MotionRecord::MotionRecord(const Scene& flown, const SimulatedMotion& run, const RunHooks& given, double fastest,
                            double slowest, bool wants_loads)
-    : scene_(with_joints(flown)), slowest_(slowest) {
+    : scene_(with_joints(flown)) {
   constexpr double per_period = 4, periods = 12, few = 64, many = 4096;
   constexpr size_t most_beginnings = 6;
   scene_.verify = false;

@@ -21,7 +21,6 @@ class MotionRecord {
   MotionRecord(const Scene& flown, const SimulatedMotion& run, const RunHooks&, double fastest, double slowest,
                bool wants_loads);
 
-  double slowest() const { return slowest_; }                      // [rad/s]
   double step() const { return step_; }                            // of the rows [s]
   std::size_t samples() const { return samples_; }                 // rows in each part
   const std::vector<double>& lasting() const { return lasting_; }  // until the next part begins [s]
@@ -47,7 +46,7 @@ class MotionRecord {
 
   Scene scene_;
   SimulatedMotion motion_;
-  double slowest_, step_ = 0;
+  double step_ = 0;
   std::size_t samples_ = 0;
   std::vector<std::size_t> windows_;  // first rows of the parts
   std::vector<double> lasting_;

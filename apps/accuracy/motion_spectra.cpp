@@ -28,16 +28,12 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-std::span<const LawBranch> laws_at(const TreeTrajectory& motion, size_t row) {
-  return motion.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(motion.laws[row]);
-}
-
 /// The largest |eigenvalue| of the equations at a row [rad/s]: how J^2 makes a vector grow.
 double largest_vibration(const Tree& tree, const TreeTrajectory& motion, size_t row) {
   constexpr int before = 40, counted = 20;
   const VectorXd& y = motion.y[row];
   MatrixXd J(y.size(), y.size());
-  tree.jacobian(motion.time[row], y.data(), closed_stops(tree, y), *tree.workspace(), J, laws_at(motion, row));
+  tree.jacobian(motion.time[row], y.data(), closed_stops(tree, y), *tree.workspace(), J, motion.laws_at(row));
   VectorXd x(y.size());
   for (Index i = 0; i < x.size(); ++i) x[i] = 1 + std::fmod(static_cast<double>(i) * std::numbers::phi, 1.0);
   double growth = 0;
@@ -84,7 +80,7 @@ Matrix6 mobility_at_end(const Tree& tree, const TreeTrajectory& motion, int body
   const auto derivative = [&](int acting) {
     on = acting;
     VectorXd y_dot(y.size());
-    other.derivative(t, y.data(), closed, *work, y_dot.data(), laws_at(motion, motion.y.size() - 1));
+    other.derivative(t, y.data(), closed, *work, y_dot.data(), motion.laws_at(motion.y.size() - 1));
     return y_dot;
   };
   // Velocities are linear in rates, so changes of accelerations are what velocities are of changes of rates.
@@ -118,21 +114,12 @@ std::pair<double, double> band_of(const ReducedBody& b, Index mode, const Matrix
   return {w / (is_joined ? beyond_a_tone : others), w * shift};
 }
 
-/// What the outputs wanted are.
-struct Wanted {
-  bool rates = false, loads = false;
-
-  explicit Wanted(const Scene& scene) {
-    for (const std::string& text : scene.outputs) {
-      const std::string output = wanted_output(text).name;
-      rates = rates || unit_of(output, {}).ends_with("/s");
-      loads = loads || is_load(output);
-    }
-    if (!scene.outputs.empty()) return;
-    rates = true;
-    loads = std::ranges::any_of(scene.joints, &JointScene::loads);
-  }
-};
+/// Are rates among the outputs that count?
+bool wants_rates(const Scene& scene) {
+  return scene.outputs.empty() || std::ranges::any_of(scene.outputs, [](const std::string& text) {
+           return unit_of(wanted_output(text).name, {}).ends_with("/s");
+         });
+}
 
 int index_of(const Tree& tree, const std::string& body) {
   const auto& bodies = tree.scene().bodies;
@@ -141,21 +128,20 @@ int index_of(const Tree& tree, const std::string& body) {
 
 }  // namespace
 
-double MotionSpectra::fastest() const {
+double fastest_motion(const SimulatedMotion& run) {
   constexpr double square = 2;  // what turns at a rate shakes at twice that, too
-  if (fastest_ >= 0) return fastest_;
-  const TreeTrajectory& motion = run_.motion;
-  fastest_ = square * largest_turn(*run_.tree, motion);
-  for (const size_t row : {size_t{0}, motion.y.size() - 1})
-    fastest_ = std::max(fastest_, largest_vibration(*run_.tree, motion, row));
-  return fastest_;
+  double fastest = square * largest_turn(*run.tree, run.motion);
+  for (const size_t row : {size_t{0}, run.motion.y.size() - 1})
+    fastest = std::max(fastest, largest_vibration(*run.tree, run.motion, row));
+  return fastest;
 }
 
-const MotionRecord& MotionSpectra::record(double slowest) const {
-  if (!record_ || slowest < record_->slowest())
-    record_.emplace(flown_, run_, hooks_, fastest(), slowest, Wanted(with_joints(flown_)).loads);
-  return *record_;
-}
+MotionSpectra::MotionSpectra(const Scene& flown, const SimulatedMotion& run, double slowest, const RunHooks& hooks)
+    : run_(run),
+      fastest_(fastest_motion(run)),
+      has_rates_(wants_rates(flown)),
+      has_loads_(wants_loads(with_joints(flown))),
+      record_(flown, run, hooks, fastest_, slowest, has_loads_) {}
 
 namespace {
 
@@ -240,7 +226,7 @@ struct MotionSpectra::Sizes {
   double force = 0, torque = 0;      // of the joint that carries it
 };
 
-MotionSpectra::Sizes MotionSpectra::sizes_of(const std::string& name, const MotionRecord& record) const {
+MotionSpectra::Sizes MotionSpectra::sizes_of(const std::string& name) const {
   constexpr double still = 1e-9;  // of its length: round-off
   Sizes r;
   const Tree& tree = *run_.tree;
@@ -257,25 +243,21 @@ MotionSpectra::Sizes MotionSpectra::sizes_of(const std::string& name, const Moti
     }
     r.deflection = std::max(r.deflection, still * deflection.length());
   }
-  const Wanted wanted(with_joints(flown_));
-  if (!wanted.rates) r.speed = std::numeric_limits<double>::infinity();
+  if (!has_rates_) r.speed = std::numeric_limits<double>::infinity();
   r.force = r.torque = std::numeric_limits<double>::infinity();
-  if (!wanted.loads) return r;
-  const MotionRecord::Loads loads = record.loads_of(name);
+  if (!has_loads_) return r;
+  const MotionRecord::Loads loads = record_.loads_of(name);
   if (loads.force > 0) r.force = loads.force, r.torque = loads.torque;
   return r;
 }
 
 std::vector<ShakenMode> MotionSpectra::shaken_beyond(const ReducedBody& all, double shown) const {
   constexpr double last = 0.75;
-  const double slowest = shown / beyond_a_tone;
-  if (!(fastest() > slowest)) return {};
-  const MotionRecord& record = this->record(slowest);
-  const MotionRecord::Driven driven = record.driven(all);
+  const MotionRecord::Driven driven = record_.driven(all);
   if (driven.signals.empty()) return {};
-  const Sizes sizes = sizes_of(all.name, record);
+  const Sizes sizes = sizes_of(all.name);
   const Deflection deflection(all);
-  const double step = std::numbers::pi / (static_cast<double>(record.samples()) * record.step());
+  const double step = std::numbers::pi / (static_cast<double>(record_.samples()) * record_.step());
   std::vector<std::vector<Spectrum>> spectra;
   for (const MatrixXd& window : driven.signals) spectra.push_back(windowed_spectra(window));
   const auto bins = [&](double from, double to) -> Band {
@@ -287,8 +269,8 @@ std::vector<ShakenMode> MotionSpectra::shaken_beyond(const ReducedBody& all, dou
   /// What the motion does in a band to a mode like k, and at which frequency.
   const auto shaken = [&](Index k, double from, double to) -> ShakenMode {
     constexpr double wide = 2;
-    const Peak peak = peak_of(spectra, record.lasting(), shares_of(all, k, driven.markers),
-                              bins(from, std::min(to, fastest())), bins(from / wide, to * wide));
+    const Peak peak = peak_of(spectra, record_.lasting(), shares_of(all, k, driven.markers),
+                              bins(from, std::min(to, fastest_)), bins(from / wide, to * wide));
     if (!peak.stands_out) return {};
     const double zeta = all.De(k, k) / (2 * all.Me(k, k) * all.frequency(k)), w = step * static_cast<double>(peak.bin);
     VectorXd q = VectorXd::Zero(all.n());
@@ -310,8 +292,8 @@ std::vector<ShakenMode> MotionSpectra::shaken_beyond(const ReducedBody& all, dou
     const double w = all.frequency(k);
     const auto [from, to] = band_of(all, k, mobility, !driven.markers.empty());
     if (w > shown) r.push_back({w, shaken(k, from, to).effect});
-    if (!(w > last * highest && highest < beyond_a_tone * fastest())) continue;
-    const ShakenMode alike = shaken(k, highest / beyond_a_tone, fastest());
+    if (!(w > last * highest && highest < beyond_a_tone * fastest_)) continue;
+    const ShakenMode alike = shaken(k, highest / beyond_a_tone, fastest_);
     r.push_back({beyond_a_tone * alike.frequency, alike.effect});
   }
   return r;

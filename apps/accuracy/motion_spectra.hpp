@@ -3,7 +3,6 @@
 #include "apps/accuracy/motion_record.hpp"
 #include "apps/simulate/simulate.hpp"
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +14,10 @@ struct ShakenMode {
   double effect = 0;     // relative
 };
 
+/// As it begins and ends, a run vibrates no faster. Nothing in it turns at more than half of this: what goes with the
+/// square of a turn is twice as fast [rad/s].
+double fastest_motion(const SimulatedMotion& run);
+
 /// How strongly the motion of a run moves modes that it leaves out.
 ///
 /// A sprung mass, an unbalanced rotor or another boom may shake a body at the frequency of one of its modes. What such
@@ -23,30 +26,23 @@ struct ShakenMode {
 /// spectra. What holds a body shifts its frequencies, so a mode is held against all peaks that are near it.
 class MotionSpectra {
  public:
-  /// Of a scene as it was flown. All of them live as long.
-  MotionSpectra(const Scene& flown, const SimulatedMotion& run, const RunHooks& hooks)
-      : flown_(flown), run_(run), hooks_(hooks) {}
-
-  /// As it begins and ends, the run vibrates no faster. Nothing in it turns at more than half of this: what goes with
-  /// the square of a turn is twice as fast [rad/s].
-  double fastest() const;
+  /// Flies a scene once more, as it was flown. `slowest`: of the vibrations that count [rad/s]. The run lives as long.
+  /// @throws InputError, NumericalError as that flight.
+  MotionSpectra(const Scene& flown, const SimulatedMotion& run, double slowest, const RunHooks&);
 
   /// The modes of a body beyond `shown` [rad/s]. `all`: the body of the scene with as many modes as there are. Those
-  /// beyond these are taken to be like the last. The first call flies the scene again.
-  /// @throws InputError, NumericalError as that flight.
+  /// beyond these are taken to be like the last.
   std::vector<ShakenMode> shaken_beyond(const ReducedBody& all, double shown) const;
 
  private:
   struct Sizes;
 
-  const MotionRecord& record(double slowest) const;
-  Sizes sizes_of(const std::string& body, const MotionRecord&) const;
+  Sizes sizes_of(const std::string& body) const;
 
-  const Scene& flown_;
   const SimulatedMotion& run_;
-  const RunHooks& hooks_;
-  mutable double fastest_ = -1;  // not known yet
-  mutable std::optional<MotionRecord> record_;
+  double fastest_;              // [rad/s]
+  bool has_rates_, has_loads_;  // among the outputs that count
+  MotionRecord record_;
 };
 
 }  // namespace flexboom

@@ -70,7 +70,7 @@ std::string words_of_whole(const BodyScene& b, int made, double error) {
 
 Planner::Planner(const Scene& scene) {
   for (size_t i = 0; i < scene.bodies.size(); ++i)
-    if (scene.bodies[i].modes_auto && scene.bodies[i].structure != "rigid") open_.push_back(i);
+    if (scene.bodies[i].modes_auto && scene.bodies[i].is_flexible()) open_.push_back(i);
 }
 
 Scene Planner::with_candidates(const Scene& scene, int candidates, int made, const RunHooks& hooks) const {

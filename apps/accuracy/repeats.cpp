@@ -16,7 +16,7 @@ bool has(const BodyScene& b, Richer richer) { return b.richer && ((*b.richer).*r
 
 bool any_elastic(const Scene& scene, std::string_view structure) {
   return std::ranges::any_of(scene.bodies, [&](const BodyScene& b) {
-    return !b.rigid && b.structure != "rigid" && (structure.empty() || b.structure == structure);
+    return b.is_flexible() && (structure.empty() || b.structure == structure);
   });
 }
 

@@ -93,7 +93,7 @@ void warn_of_the_balance(const IntegrationSummary& s, RunResult& r) {
 /// Node sets of a body where joints, springs and loads act, and for which it has no static shape.
 std::vector<std::string> loaded_without_shapes(const Scene& scene, const BodyScene& b) {
   std::vector<std::string> places;
-  if (!b.is_boom() || b.structure == "rigid" || b.structure == "eq14" || b.basis.name != "clamped") return places;
+  if (!b.is_boom() || !b.is_flexible() || b.structure == "eq14" || b.basis.name != "clamped") return places;
   const auto place_of = [](const std::string& shape) { return shape.substr(0, shape.rfind('.')); };
   std::set<std::string> shaped;
   for (const std::string& shape : b.basis.corrections) shaped.insert(place_of(shape));
@@ -111,8 +111,7 @@ std::string help_with_truncation(const RunResult& r) {
   if (worst == nullptr || !(worst->truncation > r.scene.tolerance / 2)) return "";
   std::vector<std::string> names;
   for (const BodyScene& b : r.scene.bodies)
-    if (b.is_boom() && b.structure != "rigid" && b.structure != "eq14" && b.directions != "all")
-      names.push_back(b.name);
+    if (b.is_boom() && b.is_flexible() && b.structure != "eq14" && b.directions != "all") names.push_back(b.name);
   if (!names.empty())
     return fmt::format("; {} {} modes of the hinge plane alone, and directions = \"all\" takes the others in",
                        fmt::join(names, ", "), names.size() == 1 ? "has" : "have");

@@ -16,6 +16,8 @@
 
 namespace flexboom {
 
+double bearable_balance(double tolerance) { return std::min(10 * tolerance, broken_balance); }
+
 std::vector<OutputDifference> settle_time_error(Scene& flown, Run& run, const OutputFloors& floors, Settling asked,
                                                 const RunHooks& hooks, std::vector<std::string>& plan,
                                                 const Run* reference) {

@@ -9,6 +9,10 @@
 
 namespace flexboom {
 
+/// Of energy and momenta, with a tolerance of the outputs: ten times that, the factor that a run without a budget
+/// promises.
+double bearable_balance(double tolerance);
+
 /// What settle_time_error is content with.
 struct Settling {
   double bearable;  // the largest difference of the outputs

@@ -94,9 +94,7 @@ void Truncation::measure() {
     constexpr double of_truncation = 1.0 / 3;
     const RunHooks& hooks = m_.repeats.hooks;
     ShakenModes shaken;  // found while the modes beyond are flown
-    if (beyond_)
-      shaken =
-          shaken_modes(flown_, number_beyond(m_.budget), m_.budget.reach, MotionSpectra(flown_, run_, hooks), hooks);
+    if (beyond_) shaken = shaken_modes(flown_, run_, number_beyond(m_.budget), m_.budget.reach, hooks);
     Finding finding = found();
     const double least = std::max(counting_effect * scene_.tolerance, of_truncation * largest(finding.differences));
     if (any_counts(shaken, least)) {

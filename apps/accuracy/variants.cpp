@@ -28,7 +28,7 @@ Scene as_flown(Scene scene, const Run& run) {
 
 Scene with_stiffening(Scene scene) {
   for (BodyScene& b : scene.bodies)
-    if (!b.rigid && b.structure != "rigid") b.stiffening = "on";
+    if (b.is_flexible()) b.stiffening = "on";
   return scene;
 }
 

@@ -39,11 +39,10 @@ struct Reference {
 };
 
 /// What the motion does to modes beyond, where the run can be flown once more from its start.
-ShakenModes shaken_by(const RunResult& run, const Scene& cheap, const ModesBeyond& beyond, const Reach& of_drives,
-                      const RunHooks& hooks) {
+ShakenModes shaken_by(const RunResult& run, const ModesBeyond& beyond, const Reach& of_drives, const RunHooks& hooks) {
   if (run.scene.from) return {};
   try {
-    return shaken_modes(cheap, beyond, of_drives, MotionSpectra(run.scene, run, hooks), hooks);
+    return shaken_modes(run.scene, run, beyond, of_drives, hooks);
   } catch (const std::runtime_error&) {  // the run that is verified outlives a failure
     return {};
   }
@@ -55,7 +54,7 @@ std::vector<Reference> references(const Scene& scene, const RunResult& run, cons
   const std::string& used = run.motion.summary.method;
   const ModesBeyond beyond{.least = 6, .as_many = true};
   const Reach of_drives = reach_of_drives(cheap, beyond, DriveSpectra(cheap), hooks);
-  const ShakenModes shaken = shaken_by(run, cheap, beyond, of_drives, hooks);
+  const ShakenModes shaken = shaken_by(run, beyond, of_drives, hooks);
   const Scene modes =
       with_more_modes(cheap, beyond, with_shaken(of_drives, shaken, counting_effect * run.scene.tolerance), hooks);
   return {{"time: another method", by_another_method(scene, used)},

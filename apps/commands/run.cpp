@@ -139,7 +139,7 @@ void take_plan(Scene& scene, const std::filesystem::path& from) {
   const Scene planned = load_scene((std::filesystem::is_directory(from) ? from / "scene.toml" : from).string());
   if (planned.step_tolerance() < scene.tolerance) scene.integrator_tolerance = planned.step_tolerance();
   for (BodyScene& b : scene.bodies) {
-    if (!b.is_boom() || b.structure == "rigid") continue;  // what is said to be rigid takes no modes
+    if (!b.is_boom() || !b.is_flexible()) continue;  // what is said to be rigid takes no modes
     const auto p = std::ranges::find(planned.bodies, b.name, &BodyScene::name);
     if (p == planned.bodies.end() || !p->is_boom()) {
       std::vector<std::string_view> names;

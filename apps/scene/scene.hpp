@@ -62,6 +62,7 @@ struct BodyScene {
     if (!directions_given) directions = "all";
   }
   bool is_boom() const { return !rigid && !reduced; }
+  bool is_flexible() const { return !rigid && structure != "rigid"; }  // whatever modes it has
   bool is_elastic() const;  // has it coordinates, as far as that is known before it is made?
   bool root_moves() const;  // in its own frame: the root is then a marker, not a point of the frame
 };

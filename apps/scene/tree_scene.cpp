@@ -49,7 +49,7 @@ Eigen::Matrix3d PlaceScene::axes() const {
 
 bool BodyScene::is_elastic() const {
   if (reduced) return reduced->n() > 0;
-  return !rigid && structure != "rigid" && (modes > 0 || modes_auto);
+  return is_flexible() && (modes > 0 || modes_auto);
 }
 
 bool BodyScene::root_moves() const {

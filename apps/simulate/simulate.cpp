@@ -16,14 +16,10 @@ namespace flexboom {
 
 using Eigen::VectorXd;
 
-namespace {
-
 bool wants_loads(const Scene& scene) {
   if (scene.outputs.empty()) return std::ranges::any_of(scene.joints, &JointScene::loads) || !scene.springs.empty();
   return std::ranges::any_of(scene.outputs, [](const std::string& text) { return is_load(wanted_output(text).name); });
 }
-
-}  // namespace
 
 IntegratorOptions integrator_options(const Scene& scene, const RunHooks& hooks, std::string_view chosen,
                                      long max_steps) {
@@ -109,8 +105,6 @@ std::string balances(const IntegrationSummary& s) {
   return fmt::format("energy balance {}, momentum drift {}", error_text(s.energy_balance),
                      error_text(s.momentum_drift));
 }
-
-double bearable_balance(double tolerance) { return std::min(10 * tolerance, broken_balance); }
 
 bool is_balanced(const IntegrationSummary& s) {
   return s.energy_balance <= broken_balance && !(s.momentum_drift > broken_balance);  // which may be unknown

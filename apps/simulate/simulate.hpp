@@ -70,9 +70,8 @@ struct RunHooks {
 /// The balance that no run may have: far above any tolerance that is accepted for a step.
 inline constexpr double broken_balance = 0.01;
 
-/// Of energy and momenta, with a tolerance of the outputs: ten times that, the factor that a run without a budget
-/// promises.
-double bearable_balance(double tolerance);
+/// Are loads of joints or springs among the outputs whose errors count?
+bool wants_loads(const Scene&);
 
 /// Do energy and momenta balance as well as any run must? If not, the motion is wrong whatever the tolerance was.
 bool is_balanced(const IntegrationSummary&);

@@ -174,15 +174,12 @@ OutputTable output_table(const Scene& scene, const Tree& tree, size_t rows,
 
 OutputTable output_table(const Scene& scene, const Tree& tree, const TreeTrajectory& motion) {
   const bool loads = std::any_of(scene.joints.begin(), scene.joints.end(), [](const JointScene& j) { return j.loads; });
-  const auto branches = [&](size_t row) {
-    return motion.laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(motion.laws[row]);
-  };
   const TreeWorkspaceHandle work = tree.workspace();
   return output_table(scene, tree, motion.time.size(), [&](size_t row, Moment& now) {
     const VectorXd& y = motion.y[row];
     now.time = motion.time[row], now.balance = motion.balance[row];
     tree.unpack(y, now.state);
-    if (loads) now.loads = tree.joint_loads(now.time, y, closed_stops(tree, y), *work, branches(row));
+    if (loads) now.loads = tree.joint_loads(now.time, y, closed_stops(tree, y), *work, motion.laws_at(row));
   });
 }
 

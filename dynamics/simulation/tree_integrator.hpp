@@ -41,11 +41,16 @@ struct TreeTrajectory {
   std::vector<double> time;
   std::vector<Eigen::VectorXd> y;  // Tree::layout(), prescribed coordinates as prescribed
   std::vector<Balance> balance;
-  std::vector<std::vector<LawBranch>> laws;  // per joint; empty where no joint has a law
+  std::vector<std::vector<LawBranch>> laws;  // per row; empty where no joint has a law
   std::vector<StopEvent> events;
   IntegrationSummary summary;                        // momentum_drift: unknown where something holds or pushes
   std::vector<LargestStiffening> stiffening_effect;  // per body, at outputs and telling moments
   std::vector<std::string> warnings;
+
+  /// Of a row, per joint; empty where no joint has a law.
+  std::span<const LawBranch> laws_at(size_t row) const {
+    return laws.empty() ? std::span<const LawBranch>() : std::span<const LawBranch>(laws[row]);
+  }
 };
 
 /// Is told what stiffening has reached, per body, after each look at it; may throw to end a flight.

@@ -1,6 +1,7 @@
 // What the error budget says, and what it must not say.
 
 #include "apps/accuracy/error_budget.hpp"
+#include "apps/accuracy/time_error.hpp"
 #include "apps/accuracy/variants.hpp"
 #include "apps/results/results.hpp"
 #include "tests/apps/reduced_testing.hpp"

@@ -101,7 +101,7 @@ ShakenModes shaken_modes(const std::string& shaker) {
   Scene alone = scene;
   alone.error_budget = false;
   const RunResult r = run_scene(alone, {});
-  return shaken_modes(scene, {}, {}, MotionSpectra(scene, r, {}), {});
+  return shaken_modes(scene, r, {}, {}, {});
 }
 
 TEST(MotionSpectra, WhatIsFarFromAModeOrSmallDoesNotCount) {
@@ -130,7 +130,7 @@ TEST(MotionSpectra, HearAToneInAShortRun) {
   scene.duration = 20 * std::numbers::pi / clamped_frequency(10), scene.output_step = scene.duration / 10;
   scene.error_budget = false;
   const RunResult r = run_scene(scene, {});
-  const ShakenModes shaken = shaken_modes(scene, {}, {}, MotionSpectra(scene, r, {}), {});
+  const ShakenModes shaken = shaken_modes(scene, r, {}, {}, {});
   EXPECT_TRUE(any_counts(shaken, 1e-2));
 }
 
@@ -140,8 +140,7 @@ TEST(MotionSpectra, KnowTheFastestVibrationAndTurn) {
     const Scene scene = parse_scene(boom_on_hub + shaker, "shaken.toml");
     Scene alone = scene;
     alone.error_budget = false;
-    const RunResult r = run_scene(alone, {});
-    return MotionSpectra(scene, r, {}).fastest();
+    return fastest_motion(run_scene(alone, {}));
   };
   EXPECT_NEAR(fastest(sprung_mass(5000, 1e-4)), 5000 * std::sqrt(1 + 1 / 50.108), 20);
   EXPECT_NEAR(fastest(rotor(3000)), 6000, 1);
