@@ -15,7 +15,7 @@ std::vector<std::complex<double>> spectral_sums(const std::vector<double>& value
 
 /// How strongly the drives of a scene move vibrations of each frequency.
 ///
-/// An undamped vibration of frequency w under f(t) has the amplitude A / w^2 beside its static part f / w^2, where A is
+/// An undamped vibration of frequency w under f(t) has the amplitude A / w^2 beside its static part f / w^2. A is
 /// |f(0) + integral of f' exp(i w t) dt|. A step gives one A to all frequencies, noise and pulses one A / w. So what
 /// some modes show is an upper bound for those beyond. The same holds of a square wave of which they show three
 /// harmonics. A tone has a peak beyond, which they do not show.

@@ -133,6 +133,11 @@ Vector6 acceleration(const PlaceMotionInSpace& before, const PlaceMotionInSpace&
 
 }  // namespace
 
+int index_of(const Tree& tree, const std::string& body) {
+  const auto& bodies = tree.scene().bodies;
+  return static_cast<int>(std::ranges::find(bodies, body, &ReducedBody::name) - bodies.begin());
+}
+
 MotionRecord::MotionRecord(const Scene& flown, const SimulatedMotion& run, const RunHooks& given, double fastest,
                            double slowest, bool wants_loads)
     : scene_(with_joints(flown)) {
@@ -183,8 +188,7 @@ void MotionRecord::add_accelerations() {
 }
 
 MotionRecord::Driven MotionRecord::driven(const ReducedBody& all) const {
-  const auto& flown = motion_.tree->scene().bodies;
-  const auto body = static_cast<int>(std::ranges::find(flown, all.name, &ReducedBody::name) - flown.begin());
+  const int body = index_of(*motion_.tree, all.name);
   const Multibody bodies = make_multibody(scene_, motion_.bodies);
   const std::vector<End> ends = ends_on(body, all, bodies, motion_.outputs);
   std::vector<Place> places(1);  // the body, then here and there of each end

@@ -10,10 +10,13 @@
 
 namespace flexboom {
 
+/// Where a body is among those of a tree.
+int index_of(const Tree&, const std::string& body);
+
 /// Parts of a run with rows as close as its fastest vibrations want, and what drives modes there.
 ///
-/// The parts are the start, the end, some spread evenly between, and some that begin where something may set tones off:
-/// a corner or an extreme of a function of time, a contact, a change of a law.
+/// The parts are the start, the end, and some spread evenly between. Others begin where something may set tones off: a
+/// corner or an extreme of a function of time, a contact, a change of a law.
 class MotionRecord {
  public:
   /// Flies a scene once more. `fastest` [rad/s] sets how close the rows are, `slowest` how long the parts are.

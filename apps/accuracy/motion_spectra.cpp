@@ -121,11 +121,6 @@ bool wants_rates(const Scene& scene) {
          });
 }
 
-int index_of(const Tree& tree, const std::string& body) {
-  const auto& bodies = tree.scene().bodies;
-  return static_cast<int>(std::ranges::find(bodies, body, &ReducedBody::name) - bodies.begin());
-}
-
 }  // namespace
 
 double fastest_motion(const SimulatedMotion& run) {

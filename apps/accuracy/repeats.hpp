@@ -39,8 +39,8 @@ struct Repeats {
 
   /// Differences of the outputs of another flight. Those that count must not be that flight's own errors of time, which
   /// contacts can make many tolerances. Where they are not far beyond the tolerance, the scene is flown again with a
-  /// digit more, unless they are far larger than the error of time of the run, or borne as they are. `time_error` is
-  /// that; NaN: nobody knows.
+  /// digit more. It is not where they are far larger than the error of time of the run, or borne as they are.
+  /// `time_error` is that of the run; NaN: nobody knows.
   std::vector<OutputDifference> change(
       const Run&, const Scene& other, double time_error, int refine = 0,
       const std::function<bool(const std::vector<OutputDifference>&)>& borne = {}) const;

@@ -168,7 +168,7 @@ void add_words(const Run& run, RunResult& r) {
     r.plan.push_back(fmt::format("start: goes on from {} at t = {:g} s; counts and errors are those since then",
                                  r.scene.from->file().string(), r.scene.from->time()));
   describe(with_joints(r.scene), run, r.plan);
-  r.warnings = r.scene.warnings;
+  r.warnings.insert(r.warnings.end(), r.scene.warnings.begin(), r.scene.warnings.end());
 }
 
 }  // namespace

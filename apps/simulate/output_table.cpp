@@ -1,29 +1,22 @@
 #include "apps/simulate/output_table.hpp"
 
+#include "apps/scene/wanted_accuracy.hpp"
 #include "fem/base/check.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
+#include <string_view>
 #include <vector>
 
 namespace flexboom {
 
-namespace {
-
-/// What follows the last dot.
-std::string last_word(const std::string& column) {
-  const auto dot = column.rfind('.');
-  return dot == std::string::npos ? column : column.substr(dot + 1);
-}
-
-}  // namespace
-
 std::string output_of_column(const std::string& column) {
-  const std::string last = last_word(column);
-  if (last.size() == column.size()) return column;
-  std::string first = column.substr(0, column.size() - last.size() - 1);
+  const size_t dot = column.rfind('.');
+  if (dot == std::string::npos) return column;
+  std::string first = column.substr(0, dot);
+  const std::string last = column.substr(dot + 1);
   if (last == "x" || last == "y" || last == "z") return first;
   if (last.size() > 1 && last[0] == 'q' && std::isdigit(static_cast<unsigned char>(last[1]))) return first + ".q";
   return column;
@@ -34,8 +27,8 @@ bool is_coordinate(const std::string& column) { return output_of_column(column).
 bool is_pointing(const std::string& output) { return output.ends_with(".pointing") || output.starts_with("lvlh."); }
 
 bool is_load(const std::string& output) {
-  const std::string what = last_word(output);
-  return what == "force" || what == "torque" || what.starts_with("drive");
+  const std::string_view unit = unit_of(output, {});  // that of its drive is one of the two, too, where a joint slides
+  return unit == "N" || unit == "N m";
 }
 
 Eigen::MatrixXd coordinates_of(const OutputTable& outputs, const ReducedBody& body) {
